@@ -130,6 +130,13 @@ async function columns(open) {
     [{ "known-t1": "0.12 s" }, ["--known", "T1=0.12s"]],
     [{ "known-t1": "", "known-t2": "120 ms ± 5 %", noise: "0,3 0,25" }, ["--known", "T2=0.12+-0.006", "--noise", "0.3,0.25"]],
   ];
+  for (const [fields, refused] of [[{ "known-t1": "T2 = 0.12" }, "#said"], [{ "known-t1": "", noise: "0.3" }, "#noise:invalid"]]) {
+    for (const [id, text] of Object.entries(fields)) await page.fill(`#${id}`, text);
+    await page.click("#diagnose");
+    await page.waitForSelector(refused === "#said" ? "#said:not(:empty)" : refused);
+    if (await page.isVisible("#answer")) fail(where, `${JSON.stringify(fields)} is answered`);
+  }
+  await page.fill("#noise", "");
   for (const [fields, options] of given) {
     for (const [id, text] of Object.entries(fields)) await page.fill(`#${id}`, text);
     if (await page.isVisible("#answer")) fail(where, "an answer stays that is not of what is asked");

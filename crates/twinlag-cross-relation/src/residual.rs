@@ -76,10 +76,17 @@ pub struct ResidualTest {
 }
 
 impl ResidualTest {
-    /// Whether it is of less energy than the noise has. Where the levels are from the data, these are too high, and nothing speaks
-    /// against the model.
-    pub fn is_of_less_energy(&self) -> bool {
+    /// Whether it finds less energy than the noise has.
+    pub fn finds_too_little_energy(&self) -> bool {
         self.test == TestName::TotalEnergy && self.statistic < 1.0
+    }
+
+    /// Whether the test can speak against the model. Too little energy does not where noise levels were found in the data: these are
+    /// too high.
+    ///
+    /// - `are_levels_given`: whether the levels were known beforehand
+    pub fn counts(&self, are_levels_given: bool) -> bool {
+        are_levels_given || !self.finds_too_little_energy()
     }
 }
 

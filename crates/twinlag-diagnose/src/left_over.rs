@@ -10,7 +10,7 @@ const HALF_BAND_FACTOR: f64 = 1.090_871_211_463_571;
 /// What is left, if more than noise is.
 pub(crate) fn what_is_left(fit: &ModelFit, policy: &Policy) -> Option<Unexplained> {
     // Less than noise is no effect: the level of the noise is overestimated.
-    let fails = fit.tests.iter().filter(|t| t.p_value < policy.rejection_p_value() && !t.is_of_less_energy());
+    let fails = fit.tests.iter().filter(|t| t.p_value < policy.rejection_p_value() && !t.finds_too_little_energy());
     let names: Vec<&str> = fails.map(|t| t.test.name()).collect();
     if names.is_empty() {
         return None;

@@ -64,7 +64,6 @@ impl<const P: usize> WhitenedFit<'_, P> {
     /// Whether `tests` reject the model. Where the levels are from the data, too little energy is
     /// no objection.
     pub fn is_rejected_by(&self, tests: &[ResidualTest]) -> bool {
-        let counts = |t: &&ResidualTest| self.levels.given || !t.is_of_less_energy();
-        tests.iter().filter(counts).any(|t| t.p_value < REJECTION_P_VALUE)
+        tests.iter().any(|t| t.counts(self.levels.given) && t.p_value < REJECTION_P_VALUE)
     }
 }

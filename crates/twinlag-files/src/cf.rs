@@ -16,18 +16,22 @@ impl Packing {
     pub(crate) fn of(attribute: impl Fn(&str) -> Option<Vec<f64>>) -> Self {
         let first = |name: &str| attribute(name).and_then(|values| values.first().copied());
         let range = attribute("valid_range").filter(|range| range.len() == 2);
-        let of_range = |at: usize| range.as_ref().map(|range| range[at]);
+        let end = |at: usize, name: &str| {
+            range.as_ref().map(|range| range[at]).or_else(|| first(name)).filter(|end| !end.is_nan())
+        };
         let missing = ["_FillValue", "missing_value"].into_iter().filter_map(&attribute).flatten();
         Self {
             missing: missing.collect(),
-            lowest: of_range(0).or_else(|| first("valid_min")).unwrap_or(f64::NEG_INFINITY),
-            highest: of_range(1).or_else(|| first("valid_max")).unwrap_or(f64::INFINITY),
+            lowest: end(0, "valid_min").unwrap_or(f64::NEG_INFINITY),
+            highest: end(1, "valid_max").unwrap_or(f64::INFINITY),
             scale: first("scale_factor").unwrap_or(1.0),
             offset: first("add_offset").unwrap_or(0.0),
         }
     }
 
-    /// With other limits and marks of missing values: what they are once they are stored as the values are.
+    /// With limits and marks of missing values as they are once they have been stored like the values.
+    ///
+    /// - `stored`: what becomes of a number that is stored and read
     pub(crate) fn with_marks(mut self, stored: impl Fn(f64) -> f64) -> Self {
         let marks = self.missing.iter_mut().chain([&mut self.lowest, &mut self.highest]);
         marks.for_each(|mark| *mark = stored(*mark));
@@ -64,5 +68,12 @@ mod tests {
         Packing::of(attribute).apply(&mut values);
         assert_eq!((values[1], values[2], values[4]), (-10.0, 40.0, -8.0));
         assert!(values[0].is_nan() && values[3].is_nan());
+    }
+
+    #[test]
+    fn a_limit_that_is_no_number_is_none() {
+        let mut values = [-5.0, 5.0];
+        Packing::of(|name| (name == "valid_min").then(|| vec![f64::NAN])).apply(&mut values);
+        assert_eq!(values, [-5.0, 5.0]);
     }
 }

@@ -124,10 +124,10 @@ fn members_of(dataset: &Dataset, attributes: &[Attribute], index: usize) -> Vec<
             shape: shape.to_vec(),
             obstacle,
         };
-        let packing = packing.clone().with_marks(|mark| match field.map(|field| field.meaning) {
-            Some(Meaning::Number(Number::Single)) => f64::from(mark as f32),
-            _ => mark,
-        });
+        let packing = match field.map(|field| field.meaning) {
+            Some(Meaning::Number(number)) => packing.clone().with_marks(|mark| number.stored(mark)),
+            _ => packing.clone(),
+        };
         Member { dataset: index, field, packing, variable }
     };
     match dataset.dtype() {

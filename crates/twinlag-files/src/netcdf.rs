@@ -37,7 +37,7 @@ struct Member {
     columns: usize,
     /// How its numbers are stored; `None` where it is not read.
     number: Option<Number>,
-    /// Whole numbers that are stored without their sign, or with one that is none.
+    /// Where `_Unsigned` contradicts the type that whole numbers are stored as.
     sign: Option<SignParams>,
     packing: Packing,
     is_time: bool,
@@ -95,12 +95,13 @@ fn describe(variable: &NcVariable, path: &str) -> (Member, Vec<Channel>) {
     let channel = |column| Channel { name: title(column), unit: unit.clone(), obstacle: obstacle.clone() };
     let channels = (1..=columns).map(channel).collect();
     let is_coordinate = variable.is_coordinate_variable() || text("standard_name") == "time" || text("axis") == "T";
+    let sign = SignParams::from_variable(variable);
     let member = Member {
         path: format!("{path}{}", variable.name),
         is_time: is_coordinate && columns == 1 && is_time(&variable.name, &unit),
         number: number.filter(|_| obstacle.is_none()),
-        sign: SignParams::from_variable(variable),
-        packing: packing(variable),
+        sign,
+        packing: number.map_or_else(|| Packing::of(|_| None), |number| packing(variable, number, sign)),
         unit,
         columns,
     };
@@ -124,8 +125,8 @@ fn number(kind: &NcType) -> Option<Number> {
     })
 }
 
-/// What the attributes of a variable say of its values; what was never written is missing.
-fn packing(variable: &NcVariable) -> Packing {
+/// What the attributes of a variable say of its values; where no fill value is stated, the usual one of its type is missing.
+fn packing(variable: &NcVariable, number: Number, sign: Option<SignParams>) -> Packing {
     let usual_fill = match variable.dtype {
         _ if variable.attribute("_FillValue").is_some() => None,
         NcType::Float | NcType::Double => Some(USUAL_FILL),
@@ -137,12 +138,7 @@ fn packing(variable: &NcVariable) -> Packing {
         Some(attribute) => attribute.value.as_f64_vec(),
         None => usual_fill.filter(|_| name == "_FillValue").map(|fill| vec![fill]),
     };
-    let sign = SignParams::from_variable(variable);
-    Packing::of(numbers).with_marks(|mark| match (&variable.dtype, &sign) {
-        (NcType::Float, _) => f64::from(mark as f32),
-        (_, Some(sign)) => sign.reinterpret(mark),
-        _ => mark,
-    })
+    Packing::of(numbers).with_marks(|mark| sign.map_or(number.stored(mark), |sign| sign.reinterpret(mark)))
 }
 
 impl Opened for NetCdf {

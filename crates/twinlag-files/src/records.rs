@@ -41,6 +41,11 @@ impl Number {
         }
     }
 
+    /// What becomes of a number that is stored and read: single precision rounds it.
+    pub(crate) fn stored(self, number: f64) -> f64 {
+        if self == Self::Single { f64::from(number as f32) } else { number }
+    }
+
     /// Numbers that follow each other, as doubles.
     pub(crate) fn values(self, stored: &[u8], is_big_endian: bool) -> impl Iterator<Item = f64> {
         stored.chunks_exact(self.bytes()).map(move |stored| self.value(stored, is_big_endian))

@@ -27,12 +27,14 @@ pub(crate) const MAX_TRANSFORMED_AS_IT_IS: usize = 1 << 19;
 pub struct ChannelNoise {
     /// White noise, K.
     pub std_k: [f64; 2],
-    /// Standard error of the logarithm; zero of levels that were given.
+    /// Standard error of the logarithm.
     pub log_error: [f64; 2],
     /// Step of each converter, where there is one, K.
     pub step_k: [Option<f64>; 2],
     /// Whether they are those of what a model leaves over, and no longer of third differences.
     pub is_of_residual: bool,
+    /// Whether they were known beforehand.
+    pub is_given: bool,
 }
 
 /// Rows of a stretch that levels of noise can be found in.
@@ -42,11 +44,6 @@ impl ChannelNoise {
     /// Step of each converter where it is coarse beside the noise, K.
     pub fn coarse_step_k(&self) -> [Option<f64>; 2] {
         [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k[i]))
-    }
-
-    /// Whether they were given, and not found in the record.
-    pub(crate) fn are_given(&self) -> bool {
-        self.log_error == [0.0; 2]
     }
 
     /// The larger standard error of the logarithm of a variance, of the two channels.
@@ -95,6 +92,7 @@ pub fn levels(observations: &Observations) -> Option<ChannelNoise> {
         log_error: found.map(|l| l.standard_error_k / l.std_k.max(nothing)),
         step_k: found.map(|l| l.quantisation_step_k),
         is_of_residual: false,
+        is_given: false,
     })
 }
 

@@ -75,7 +75,7 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
-    /// Whether a test of the residual finds that it is not noise of the estimated levels.
+    /// Whether a test of the residual speaks against the model ([`ResidualTest::counts`]).
     pub fn is_contradicted(&self) -> bool {
         self.is_weighted_by_residual
     }

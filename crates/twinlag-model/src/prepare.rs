@@ -77,8 +77,7 @@ impl Prepared {
         let mut levels =
             defects::levels(&observations).ok_or(ModelError::InShreds { samples, needed: defects::MIN_LEVEL_ROWS })?;
         if let Some(std_k) = settings.noise_std_k {
-            levels.std_k = std_k;
-            levels.log_error = [0.0; 2];
+            levels = ChannelNoise { std_k, log_error: [0.0; 2], is_given: true, ..levels };
         } else {
             // Those of an earlier preparation are over other levels: a record that is left of several has none.
             let is_joined = observations.is_joined();

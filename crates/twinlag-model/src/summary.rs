@@ -114,8 +114,7 @@ pub fn summarise(
     policy: &Policy,
 ) -> ModelFit {
     let Left { tests, chi2_per_dof, trace } = Left::of(fitted, observations, selection, levels, policy);
-    let counts = |t: &&ResidualTest| levels.are_given() || !t.is_of_less_energy();
-    let rejects = tests.iter().filter(counts).any(|t| t.p_value < policy.rejection_p_value());
+    let rejects = tests.iter().any(|t| t.counts(levels.is_given) && t.p_value < policy.rejection_p_value());
     let covariance = covariance(fitted, observations, selection, rejects);
     let influence = covariance.as_deref().and_then(|c| Influence::of(fitted, observations, selection, c));
     let (time_constants, difference) =

@@ -105,6 +105,7 @@
 
   // What was answered is not of what is asked now.
   function forgetAnswer() {
+    byId("noise").setCustomValidity("");
     byId("answer").hidden = byId("gas").hidden = true;
     say("");
   }
@@ -216,7 +217,7 @@
   // --- questions and answers
 
   const now = () => new Date().toISOString().replace("T", " ").slice(0, 16) + " UTC";
-  const decimal = (id) => byId(id).value.trim().replace(",", ".");
+  const decimal = (id) => byId(id).value.trim().replaceAll(",", ".");
 
   function say(text) {
     byId("said").textContent = text;
@@ -284,16 +285,27 @@
 
   // What is known beforehand.
   function options() {
-    const of = ([sensor, id]) => [sensor, decimal(id).replace(/^t[12]\s*=/i, "").replace("±", "+-").replace(/\s/g, "")];
+    const of = ([sensor, id]) => [sensor, decimal(id).replace(new RegExp(`^${sensor}\\s*=`, "i"), "")];
     const known = Object.entries(knownOf).map(of).filter(([, value]) => value).map(([sensor, value]) => `${sensor}=${value}`);
     const noise_std_k = noise();
     return JSON.stringify({ ...(known.length > 0 && { known }), ...(noise_std_k.length > 0 && { noise_std_k }) });
   }
 
-  const noise = () => byId("noise").value.trim().split(/[;\s]+/).filter(Boolean).map((level) => Number(level.replace(",", ".")));
+  // Levels of both sensors. A comma before a blank parts them; another one is a decimal comma.
+  function noise() {
+    const levels = byId("noise").value.trim().replace(/,\s+/g, " ").split(/[;\s]+/).filter(Boolean);
+    return levels.map((level) => Number(level.replace(",", ".")));
+  }
+
+  function checkNoise() {
+    const levels = noise();
+    const isEmptyOrPair = levels.length === 0 || (levels.length === 2 && levels.every((level) => Number.isFinite(level) && level > 0));
+    byId("noise").setCustomValidity(isEmptyOrPair ? "" : "expected the noise of the first and of the second sensor, such as 0.1 0.15");
+    return byId("noise").reportValidity();
+  }
 
   async function diagnose() {
-    if (!byId("noise").reportValidity()) return;
+    if (!checkNoise()) return;
     const answer = await work("diagnose", { options: options() });
     if (!answer) return;
     byId("gas").hidden = true;
@@ -345,10 +357,6 @@
   });
   byId("time-unit").addEventListener("change", ({ target }) => choose("time_unit", target.value || undefined));
   for (const id of [...Object.values(knownOf), "noise"]) byId(id).addEventListener("input", forgetAnswer);
-  byId("noise").addEventListener("input", ({ target }) => {
-    const isOne = noise().length === 0 || (noise().length === 2 && noise().every((level) => level > 0));
-    target.setCustomValidity(isOne ? "" : "expected the noise of the first and of the second sensor, such as 0.1 0.15");
-  });
   byId("period").addEventListener("change", ({ target }) => {
     const period_s = Number(decimal("period"));
     target.setCustomValidity(period_s >= 0 ? "" : "expected a number of seconds, such as 0.01");

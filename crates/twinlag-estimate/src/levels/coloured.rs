@@ -16,8 +16,8 @@ const AR1_DIFFERENCE_STEP: f64 = 0.01;
 /// Rounds of weights and coefficients. Weights enter the second order alone: experiment
 /// `coloured-noise` runs on three.
 const WEIGHING_ROUNDS: usize = 3;
-/// Spread of the misfit at the corners of the simplex, as a share of it, at which it stops. A chi-square of twenty leaves the
-/// coefficients within `√(20 × 1e-7)`, a thousandth of their standard errors.
+/// Spread of the misfit at the corners of a simplex, as a share of its value at the start, at which the simplex stops: of a chi-square
+/// of `M` it leaves the coefficients within `√(1e-7 M)` of their standard errors.
 const AR1_SPREAD: f64 = 1e-7;
 /// Edge of the first simplex, in coefficients: a sixth of the range from −0.97 to 0.97.
 const AR1_EDGE: f64 = 0.3;

@@ -14,6 +14,12 @@ fn attributes_say_units_missing_ones_scale_and_start() {
 }
 
 #[test]
+fn marks_of_missing_values_are_as_the_values_are_stored() {
+    let table = check("marks.h5", &Choice::default());
+    assert_eq!(table.columns()[1].missing(), 1);
+}
+
+#[test]
 fn fields_of_records_are_channels() {
     check("records.h5", &Choice::default());
 }

@@ -20,11 +20,11 @@ def replace(path: str | os.PathLike[str], text: str) -> None:
     part = target.with_name(f".twinlag-{secrets.token_hex(8)}.part")
     try:
         with part.open("x", encoding="utf-8", newline="\n") as file:
+            if target.exists():
+                part.chmod(stat.S_IMODE(target.stat().st_mode))
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        if target.exists():
-            part.chmod(stat.S_IMODE(target.stat().st_mode))
         os.replace(part, target)
     except BaseException:
         part.unlink(missing_ok=True)

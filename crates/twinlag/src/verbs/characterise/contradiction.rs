@@ -41,7 +41,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                 let what = given(known);
                 let instead = Remark::time_constant(["T1", "T2"][index], own_s, Some(error_s));
                 self.contradictions.push(Reason::Contradicted { what: what.clone(), deviations, grade: Grade::NoGo });
-                self.warnings.push(Remark::Contradicted { what, instead, deviations }.to_string());
+                let remark = Remark::Contradicted { what, instead, deviations };
+                self.warnings.push(format!("{remark}. Or an effect is missing: a diagnosis looks for one"));
             }
         }
         Ok(())

@@ -58,7 +58,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let options = self.asked.options;
         if self.judged.is_rejected || out.status == Status::ModelRejected {
             let is_of_energy =
-                out.residual.tests.iter().any(|t| t.is_of_less_energy() && t.p_value < REJECTION_P_VALUE);
+                out.residual.tests.iter().any(|t| t.finds_too_little_energy() && t.p_value < REJECTION_P_VALUE);
             let energy = out.residual.chi2_per_dof.filter(|_| is_of_energy && options.noise_std_k.is_some());
             basis.reasons.push(match energy {
                 Some(energy) => {
