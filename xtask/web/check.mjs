@@ -128,7 +128,7 @@ async function columns(open) {
   await diagnosed(page);
   const given = [
     [{ "known-t1": "0.12 s" }, ["--known", "T1=0.12s"]],
-    [{ "known-t1": "", "known-t2": "120 ms ± 5 %", noise: "0,3 0,25" }, ["--known", "T2=0.12+-0.006", "--noise", "0.3,0.25"]],
+    [{ "known-t1": "", "known-t2": "450 ms ± 5 %", noise: "0,1 0,1" }, ["--known", "T2=0.45+-0.0225", "--noise", "0.1,0.1"]],
   ];
   for (const [fields, refused] of [[{ "known-t1": "T2 = 0.12" }, "#said"], [{ "known-t1": "", noise: "0.3" }, "#noise:invalid"]]) {
     for (const [id, text] of Object.entries(fields)) await page.fill(`#${id}`, text);
