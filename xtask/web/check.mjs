@@ -193,9 +193,22 @@ async function stops(open) {
   await page.click("#stop");
   await page.waitForFunction(() => document.getElementById("said").textContent === "Stopped.");
   await page.waitForSelector("#asking:not([hidden])");
-  // What comes after it works.
+  // What comes after it works, and a diagnosis stays where its gas temperature is stopped.
   await drop(page, ["first.csv"]);
   await diagnosed(page);
+  await page.fill("#period", "abc");
+  await page.click("#diagnose");
+  await page.waitForSelector("#period:invalid");
+  await page.fill("#period", "");
+  await page.dispatchEvent("#period", "change");
+  await page.waitForSelector("#asking:not([hidden])");
+  await diagnosed(page);
+  await page.click("#compensate");
+  await page.click("#stop");
+  await page.waitForFunction(() => document.getElementById("said").textContent === "Stopped.");
+  await page.waitForSelector("#answer:not([hidden])");
+  await page.click("#compensate");
+  await page.waitForSelector("#gas:not([hidden])", { timeout: 0 });
   await page.close();
 }
 

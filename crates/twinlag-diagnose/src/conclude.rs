@@ -78,7 +78,7 @@ pub(crate) fn conclude(
     basis.reasons.extend(effects_on_bounds(&with_effects));
     basis.reasons.extend(across.and_then(Across::reason));
     remarks.extend(across.and_then(Across::remark).filter(|_| verdict == Verdict::PartlyExplained));
-    basis.reasons.extend(contradiction.as_ref().and_then(Contradiction::reason));
+    basis.reasons.extend(contradiction.as_ref().map(Contradiction::reason));
     remarks.extend(contradiction.and_then(Contradiction::remark));
     let span_s = state.prepared.observations.span_s();
     let mut circumstances =

@@ -119,13 +119,13 @@ impl Contradiction {
         self.grade == Grade::NoGo
     }
 
-    /// The reason that each number has for it; `None` where numbers are no worse for it than for what was given.
-    pub(crate) fn reason(&self) -> Option<Reason> {
+    /// The reason that each number has for it.
+    pub(crate) fn reason(&self) -> Reason {
         let (what, deviations, grade) = (self.what.clone(), self.deviations, self.grade);
         match (&self.instead, grade) {
-            (None, _) => Some(Reason::LeftBehind { what, deviations }),
-            (Some(_), Grade::Go) => None,
-            (Some(_), _) => Some(Reason::Contradicted { what, deviations, grade }),
+            (None, _) => Reason::LeftBehind { what, deviations },
+            (Some(_), Grade::Go) => Reason::EffectsOrGiven { what },
+            (Some(_), _) => Reason::Contradicted { what, deviations, grade },
         }
     }
 

@@ -131,6 +131,11 @@ pub enum Reason {
         /// The best grade that a number can have with it.
         grade: Grade,
     },
+    /// Either the effects that were found are there, or what was given beforehand is wrong.
+    EffectsOrGiven {
+        /// What was given, as `T1 = 0.5 s`.
+        what: String,
+    },
     /// The fit departs from what was given: what the model lacks drags it away.
     LeftBehind {
         /// What was given, as `T1 = 0.5 ± 0.1 s`.
@@ -384,6 +389,9 @@ impl fmt::Display for Reason {
                 let by = rounded(*deviations);
                 write!(f, "{so}the record contradicts {what}, as given, by {by} standard deviations")
             }
+            Self::EffectsOrGiven { what } => {
+                write!(f, "right if {what}, as given: without it, fewer effects explain the record as well")
+            }
             Self::LeftBehind { what, deviations } => write!(
                 f,
                 "the fit departs from {what}, as given, by {} of its standard deviations: something that the model lacks drags \
@@ -617,7 +625,9 @@ pub struct Basis {
 impl Basis {
     /// What speaks against what was given beforehand.
     pub(crate) fn against_given(&self) -> impl Iterator<Item = &Reason> {
-        self.reasons.iter().filter(|reason| matches!(reason, Reason::Contradicted { .. }))
+        let is_against =
+            |reason: &&Reason| matches!(reason, Reason::Contradicted { .. } | Reason::EffectsOrGiven { .. });
+        self.reasons.iter().filter(is_against)
     }
 
     /// The numbers of a fit of which nothing but the residual is known.

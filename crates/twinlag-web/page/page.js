@@ -12,6 +12,7 @@
   const waiting = new Map();            // requests that are not answered, by number
   let requests = 0;
   const links = { answer: [], gas: [] };
+  let answered;                         // the diagnosis that is shown: its report, JSON and model
 
   // --- the worker
 
@@ -105,6 +106,7 @@
 
   // What was answered is not of what is asked now.
   function forgetAnswer() {
+    answered = undefined;
     byId("noise").setCustomValidity("");
     byId("answer").hidden = byId("gas").hidden = true;
     say("");
@@ -258,9 +260,12 @@
     }
   }
 
+  // The answer that is shown stays, where it is the gas temperature that is stopped.
   async function stop() {
+    const kept = answered;
     await restart();
     await readFiles();
+    if (kept) showAnswer(kept);
     say("Stopped.");
   }
 
@@ -300,25 +305,40 @@
   function checkNoise() {
     const levels = noise();
     const isEmptyOrPair = levels.length === 0 || (levels.length === 2 && levels.every((level) => Number.isFinite(level) && level > 0));
-    byId("noise").setCustomValidity(isEmptyOrPair ? "" : "expected the noise of the first and of the second sensor, such as 0.1 0.15");
-    return byId("noise").reportValidity();
+    return isValid("noise", isEmptyOrPair, "expected the noise of the first and of the second sensor in K, without its unit, such as 0.1 0.15");
+  }
+
+  function checkPeriod() {
+    const text = decimal("period");
+    return isValid("period", text === "" || (Number.isFinite(Number(text)) && Number(text) > 0), "expected a number of seconds, such as 0.01");
+  }
+
+  // Says what is expected where an input is not valid.
+  function isValid(id, is, expected) {
+    byId(id).setCustomValidity(is ? "" : expected);
+    if (!is) say(`${byId(id).labels[0].textContent.trim()}: ${expected}`);
+    return byId(id).reportValidity();
   }
 
   async function diagnose() {
-    if (!checkNoise()) return;
+    if (!checkPeriod() || !checkNoise()) return;
     const answer = await work("diagnose", { options: options() });
-    if (!answer) return;
+    if (answer) showAnswer(answer);
+    if (answer) say("Diagnosed.");
+  }
+
+  function showAnswer(answer) {
+    answered = answer;
     byId("gas").hidden = true;
     give("answer", answer.report, [
       { title: "Report", name: `${stem()}-report.html`, text: answer.report, type: "text/html" },
       { title: "Answer as JSON", name: `${stem()}-diagnosis.json`, text: answer.json, type: JSON_TYPE },
       { title: "Model", name: `${stem()}-model.json`, text: answer.model, type: JSON_TYPE },
     ]);
-    say("Diagnosed.");
   }
 
   async function compensate() {
-    const answer = await work("compensate");
+    const answer = await work("compensate", { model: answered.model });
     if (!answer) return;
     const csv = answer.csv ? [{ title: "Gas temperature as CSV", name: `${stem()}-gas.csv`, text: answer.csv, type: "text/csv" }] : [];
     give("gas", answer.report, [
@@ -357,10 +377,8 @@
   });
   byId("time-unit").addEventListener("change", ({ target }) => choose("time_unit", target.value || undefined));
   for (const id of [...Object.values(knownOf), "noise"]) byId(id).addEventListener("input", forgetAnswer);
-  byId("period").addEventListener("change", ({ target }) => {
-    const period_s = Number(decimal("period"));
-    target.setCustomValidity(period_s >= 0 ? "" : "expected a number of seconds, such as 0.01");
-    if (target.reportValidity()) choose("period_s", period_s > 0 ? period_s : undefined);
+  byId("period").addEventListener("change", () => {
+    if (checkPeriod()) choose("period_s", Number(decimal("period")) || undefined);
   });
   // Anywhere: a file that misses its place would be opened instead of the page.
   addEventListener("dragover", (event) => { event.preventDefault(); byId("drop").classList.add("over"); });

@@ -36,8 +36,8 @@ const answers = {
   diagnose: ({ options, madeAt }) => ({
     json: page.diagnose(options), report: page.report(madeAt), model: page.model(),
   }),
-  compensate: ({ madeAt }) => ({
-    json: page.compensate(), report: page.gasReport(madeAt), csv: page.gasCsv(),
+  compensate: ({ model, madeAt }) => ({
+    json: page.compensate(model), report: page.gasReport(madeAt), csv: page.gasCsv(),
   }),
 };
 

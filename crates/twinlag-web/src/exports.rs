@@ -67,8 +67,8 @@ impl Page {
     }
 
     /// [`Session::compensate`].
-    pub fn compensate(&mut self) -> Result<String, JsError> {
-        self.session.compensate(&watch).map_err(thrown)
+    pub fn compensate(&mut self, model: &str) -> Result<String, JsError> {
+        self.session.compensate(model, &watch).map_err(thrown)
     }
 
     /// [`Session::report`].

@@ -132,14 +132,16 @@ impl Session {
         Ok(json)
     }
 
-    /// Reconstructs the gas temperature of the first record by the model of the diagnosis; returns the answer of `twinlag compensate`.
+    /// Reconstructs the gas temperature of the first record; returns the answer of `twinlag compensate`.
+    ///
+    /// - `model`: what [`Session::model`] gave of this or another session
     ///
     /// # Errors
-    /// [`SessionError::Order`] without a diagnosis; those of [`compensate_watched`].
-    pub fn compensate(&mut self, watch: Watch<'_>) -> Result<String, SessionError> {
-        let diagnosis = self.diagnosis()?;
-        let options = CompensateOptions { model: Some(diagnosis.model()), ..CompensateOptions::default() };
-        let answer = compensate_watched(&self.added[0].record, &options, watch)?;
+    /// [`SessionError::Order`] without a record, [`SessionError::Json`] of what is no model; those of [`compensate_watched`].
+    pub fn compensate(&mut self, model: &str, watch: Watch<'_>) -> Result<String, SessionError> {
+        let options = CompensateOptions { model: Some(parsed(model)?), ..CompensateOptions::default() };
+        let first = self.added.first().ok_or(SessionError::Order { expected: "a record" })?;
+        let answer = compensate_watched(&first.record, &options, watch)?;
         let json = serde_json::to_string(&answer)?;
         self.gas = Some(answer);
         Ok(json)

@@ -43,9 +43,10 @@ fn a_session_diagnoses_as_the_library_does() {
     assert_eq!(answer, serde_json::to_string(&wanted).expect("JSON"));
     let report = session.report("2026-01-01").expect("a report");
     assert!(report.contains("run.csv") && report.contains("2026-01-01"));
-    assert_eq!(session.model().expect("a model"), serde_json::to_string_pretty(&wanted.model()).expect("JSON"));
+    let model = session.model().expect("a model");
+    assert_eq!(model, serde_json::to_string_pretty(&wanted.model()).expect("JSON"));
 
-    session.compensate(&unwatched).expect("an answer");
+    session.compensate(&model, &unwatched).expect("an answer");
     let csv = session.gas_csv().expect("in order").expect("a gas temperature");
     let options = CompensateOptions { model: Some(wanted.model()), ..CompensateOptions::default() };
     let gas = compensate(&record, &options).expect("an answer");
