@@ -336,6 +336,25 @@ impl Reason {
             _ => String::new(),
         }
     }
+
+    /// A reason that lies in what was given beforehand, in words.
+    fn of_given(&self) -> String {
+        match self {
+            Self::Contradicted { what, deviations, grade } => {
+                let so = if *grade == Grade::NoGo { "" } else { "right if that is so all the same: " };
+                format!("{so}the record contradicts {what}, as given, by {} standard deviations", rounded(*deviations))
+            }
+            Self::EffectsOrGiven { what } => {
+                format!("right if {what}, as given: without it, fewer effects explain the record as well")
+            }
+            Self::LeftBehind { what, deviations } => format!(
+                "the fit departs from {what}, as given, by {} of its standard deviations: something that the model lacks drags \
+                 it away",
+                rounded(*deviations)
+            ),
+            _ => String::new(),
+        }
+    }
 }
 
 /// So many records, in words.
@@ -384,20 +403,9 @@ impl fmt::Display for Reason {
                 listed(effects, in_other_sensor)
             ),
             Self::OnBound | Self::EffectOnBound { .. } => f.write_str(&self.of_bounds()),
-            Self::Contradicted { what, deviations, grade } => {
-                let so = if *grade == Grade::NoGo { "" } else { "right if that is so all the same: " };
-                let by = rounded(*deviations);
-                write!(f, "{so}the record contradicts {what}, as given, by {by} standard deviations")
+            Self::Contradicted { .. } | Self::EffectsOrGiven { .. } | Self::LeftBehind { .. } => {
+                f.write_str(&self.of_given())
             }
-            Self::EffectsOrGiven { what } => {
-                write!(f, "right if {what}, as given: without it, fewer effects explain the record as well")
-            }
-            Self::LeftBehind { what, deviations } => write!(
-                f,
-                "the fit departs from {what}, as given, by {} of its standard deviations: something that the model lacks drags \
-                 it away",
-                rounded(*deviations)
-            ),
             Self::FoundAsNoise { effect } if *effect == Identifier::COLOURED_NOISE => write!(
                 f,
                 "right if the {effect} that was found is noise, and the noise of the other sensor is white: a response that the model lacks, \
