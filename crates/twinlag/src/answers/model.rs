@@ -201,10 +201,10 @@ impl Model {
         let mut out: Vec<Reason> = self.incomplete().into_iter().collect();
         let held: Vec<&ModelEffect> =
             self.effects.iter().filter(|e| e.is_of_the_rig() && !fitted_again.contains(&e.effect)).collect();
+        let is_own = self.found_in.as_ref().is_some_and(|data| data.is(record));
         if held.is_empty() {
-            let is_own = self.found_in.as_ref().is_some_and(|data| data.is(record));
             let source = self.found_in.as_ref().map(|data| data.source.clone());
-            out.extend((!is_own).then_some(Reason::NothingInModel { source }));
+            out.extend(if is_own { self.of_its_time_constants() } else { Some(Reason::NothingInModel { source }) });
             return out;
         }
         let no_go: Vec<String> =
@@ -220,10 +220,7 @@ impl Model {
         if !outside.is_empty() {
             out.push(Reason::OutsideRange { what: outside.join(", ") });
         }
-        out.push(Reason::HeldAtModel {
-            source: self.found_in.as_ref().map(|data| data.source.clone()),
-            is_own: self.found_in.as_ref().is_some_and(|data| data.is(record)),
-        });
+        out.push(Reason::HeldAtModel { source: self.found_in.as_ref().map(|data| data.source.clone()), is_own });
         // One of them says enough.
         let conditional = numbers(&held).find(|(_, p)| p.grade == Some(Grade::Conditional));
         out.extend(conditional.map(|(effect, p)| Reason::Follows {
@@ -232,6 +229,13 @@ impl Model {
             because: p.because.clone(),
         }));
         out
+    }
+
+    /// What its own record left open of its time constants: the same record does not settle it when it is fitted again.
+    fn of_its_time_constants(&self) -> Option<Reason> {
+        let worst = self.time_constant_grades.iter().flatten().max_by_key(|judgement| judgement.grade)?;
+        let Judgement { grade, because, .. } = worst.clone();
+        (grade != Grade::Go).then(|| Reason::Follows { from: "the time constants in the model".into(), grade, because })
     }
 
     /// Why it may lack something, where that is so.

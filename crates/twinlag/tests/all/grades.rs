@@ -3,7 +3,7 @@
 use crate::common::{read, record};
 use twinlag::diagnosis::Grade;
 use twinlag::signal::undeclared::{GasKind, Kind, undeclared};
-use twinlag::{CompensateOptions, DiagnoseOptions, compensate, diagnose};
+use twinlag::{CompensateOptions, DiagnoseOptions, Model, compensate, diagnose};
 
 /// Failed: of a second of plunges neither time constant is determined, and the difference of where the fit ended in their valley,
 /// 0.003 ± 0.006 s in place of 0.141 s, was go.
@@ -45,4 +45,25 @@ fn a_gas_temperature_rests_on_the_sensor_that_is_trusted() {
             assert!(answer.judgement.because.contains(&condition), "{}", answer.judgement.because);
         }
     }
+}
+
+/// Failed: fitted again to the record that it was found in, a model without effects made of conditional time constants ones that are go, and
+/// the gas temperature with them.
+#[test]
+fn a_model_of_its_own_record_is_no_surer_than_the_diagnosis_was() {
+    let gas = "kind = \"turbulence\"\nstd_k = 40.0\ncorner_hz = 0.01\ncutoff_hz = 0.15";
+    let sensors = [7.4, 28.0].map(|tau_s| format!("time_constant_s = {tau_s}\nnoise = {{ std_k = 0.25 }}"));
+    let record = record(5, 1000, 1.0, gas, [&sensors[0], &sensors[1]]);
+    let mut model = diagnose(&record, &DiagnoseOptions::default()).expect("a sound question").model();
+    assert!(model.effects.is_empty(), "{:?}", model.effects);
+    let judged = |model: &Model| {
+        let options = CompensateOptions { model: Some(model.clone()), ..CompensateOptions::default() };
+        compensate(&record, &options).expect("a gas temperature").judgement
+    };
+    assert_eq!(judged(&model).grade, Grade::Go);
+    let [_, of_t2] = model.time_constant_grades.as_mut().expect("it is of a diagnosis");
+    (of_t2.grade, of_t2.because) = (Grade::Conditional, "right if there is no delay of a usual size".into());
+    let judgement = judged(&model);
+    assert_eq!(judgement.grade, Grade::Conditional, "{judgement:?}");
+    assert!(judgement.because.contains("no delay of a usual size"), "{judgement:?}");
 }
