@@ -1,54 +1,61 @@
-//! What a fuzzer was begun with and what it has found, put to its target once more.
+//! What a fuzzer is begun with, and what it has found, put to its target once more.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Puts each file of a target's folder to it, in the order of their names.
-fn replay(name: &str, target: fn(&[u8])) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(name);
-    let entries = fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
-    let mut paths: Vec<_> = entries.map(|entry| entry.expect("readable").path()).collect();
-    paths.sort();
-    assert!(!paths.is_empty(), "{}: no files", folder.display());
+/// Files that the tree has for other tests, of binary formats and as tables, and plans of its experiments.
+const FIXTURES: &str = "../crates/twinlag-files/tests/fixtures";
+const EXPERIMENTS: &str = "../docs/src/experiments";
+
+/// Puts each file of a folder, or of its folders, to a target.
+fn replay(folder: &str, target: fn(&[u8])) {
+    let paths = files(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
+    assert!(!paths.is_empty(), "{folder}: no files");
     for path in paths {
         eprintln!("{}", path.display());
         target(&fs::read(&path).expect("readable"));
     }
 }
 
-macro_rules! targets {
-    ($($name:ident),* $(,)?) => {
-        $(#[test]
-        fn $name() {
-            replay(stringify!($name), twinlag_fuzz::$name);
-        })*
-
-        /// A target without its program is never searched.
-        #[test]
-        fn each_target_has_its_program() {
-            let manifest = include_str!("../Cargo.toml");
-            for name in [$(stringify!($name)),*] {
-                assert!(manifest.contains(&format!("path = \"targets/{name}.rs\"")), "{name}");
-            }
-        }
-    };
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let inside = |path: PathBuf| if path.is_dir() { files(&path) } else { vec![path] };
+    entries.flat_map(|entry| inside(entry.expect("readable").path())).collect()
 }
 
-targets!(
-    text,
-    spreadsheet,
-    mdf,
-    tdms,
-    parquet,
-    hdf5,
-    netcdf,
-    numpy,
-    matlab,
-    rig,
-    plan,
-    selection,
-    model,
-    characterise,
-    diagnose,
-    compensate,
-);
+#[test]
+fn text() {
+    replay("corpus/text", twinlag_fuzz::text);
+    replay(FIXTURES, twinlag_fuzz::text);
+}
+
+#[test]
+fn binary() {
+    replay(FIXTURES, twinlag_fuzz::binary);
+}
+
+#[test]
+fn rig() {
+    replay("corpus/rig", twinlag_fuzz::rig);
+}
+
+#[test]
+fn plan() {
+    replay(EXPERIMENTS, twinlag_fuzz::plan);
+}
+
+#[test]
+fn selection() {
+    replay("corpus/selection", twinlag_fuzz::selection);
+}
+
+#[test]
+fn model() {
+    replay("corpus/model", twinlag_fuzz::model);
+}
+
+#[test]
+fn readings() {
+    let verbs = [twinlag_fuzz::characterise, twinlag_fuzz::diagnose, twinlag_fuzz::compensate];
+    verbs.into_iter().for_each(|verb| replay("corpus/readings", verb));
+}

@@ -85,7 +85,7 @@ impl ResidualTest {
     /// too high.
     ///
     /// - `are_levels_given`: whether the levels were known beforehand
-    pub fn counts(&self, are_levels_given: bool) -> bool {
+    pub fn can_reject(&self, are_levels_given: bool) -> bool {
         are_levels_given || !self.finds_too_little_energy()
     }
 }

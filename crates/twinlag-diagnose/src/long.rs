@@ -67,10 +67,10 @@ impl<'a> State<'a> {
         let mut out = Self::of(base, prepared, settings, watch);
         out.current = out.carried_fit(&current);
         if part.taken.iter().any(|taken| taken.candidate.effect.about().is_narrow) {
-            out.prepared.find_levels(&out.current, settings);
+            out.prepared.find_levels(&out.current);
             out.refit();
         }
-        if part.prepared.levels.is_of_residual && out.prepared.has_high_levels(&out.current, settings) {
+        if part.prepared.levels.is_of_residual && out.prepared.has_high_levels(&out.current) {
             out.prepared.lower_levels(&out.current, settings);
             out.refit();
         }

@@ -262,7 +262,7 @@ impl<'a> State<'a> {
                 self.current = taken.candidate.fitted.clone().in_order();
                 if taken.effect().about().is_narrow {
                     // A line is in the third differences as well.
-                    self.prepared.find_levels(&self.current, self.settings);
+                    self.prepared.find_levels(&self.current);
                     self.refit();
                 }
                 shortened = taken.candidate.shortened.take().zip(shorter);
@@ -482,7 +482,7 @@ impl<'a> State<'a> {
 
     /// Lowers noise levels to what is left over, where that is clearly less.
     pub(crate) fn lower_noise(&self) -> Option<Proposal> {
-        let is_due = self.prepared.has_high_levels(&self.current, self.settings);
+        let is_due = self.prepared.has_high_levels(&self.current);
         let entry = Move::LowerNoise { energy: self.current.mean_energy() };
         is_due.then_some(Proposal { entry, change: Change::Levels })
     }

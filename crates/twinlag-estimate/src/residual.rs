@@ -64,6 +64,6 @@ impl<const P: usize> WhitenedFit<'_, P> {
     /// Whether `tests` reject the model. Where the levels are from the data, too little energy is
     /// no objection.
     pub fn is_rejected_by(&self, tests: &[ResidualTest]) -> bool {
-        tests.iter().any(|t| t.counts(self.levels.given) && t.p_value < REJECTION_P_VALUE)
+        tests.iter().any(|t| t.can_reject(self.levels.given) && t.p_value < REJECTION_P_VALUE)
     }
 }

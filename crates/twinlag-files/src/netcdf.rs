@@ -185,8 +185,7 @@ impl Opened for NetCdf {
 }
 
 impl NetCdf {
-    /// The numbers of a variable as they are stored. Bytes of version 4 take the same way as those of HDF5: a reader
-    /// for each type would be ten times the code, which the page for a browser has no room for.
+    /// The numbers of a variable as they are stored. Bytes of version 4 take the same way as those of HDF5.
     fn stored(&self, member: &Member, number: Number) -> Result<Vec<f64>, Fault> {
         if let Some(classic) = self.file.as_classic() {
             return Ok(classic.read_variable_as_f64(&member.path).map_err(fault)?.into_raw_vec_and_offset().0);

@@ -75,7 +75,7 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
-    /// Whether a test of the residual speaks against the model ([`ResidualTest::counts`]).
+    /// Whether a test of the residual speaks against the model ([`ResidualTest::can_reject`]).
     pub fn is_contradicted(&self) -> bool {
         self.is_weighted_by_residual
     }

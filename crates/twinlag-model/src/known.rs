@@ -102,10 +102,10 @@ impl Known {
         let has_spikes = settings.effects.contains(&Identifier::SPIKES) && prepared.mask_spikes(&fitted);
         let has_line = model.effects.iter().any(|e| e.about().is_narrow);
         if has_spikes || has_line || !prepared.found.is_empty() {
-            prepared.find_levels(&fitted, settings);
+            prepared.find_levels(&fitted);
             fitted = fit(&prepared, &model.clone().with_noise(prepared.levels.std_k));
         }
-        if prepared.has_high_levels(&fitted, settings) {
+        if prepared.has_high_levels(&fitted) {
             prepared.lower_levels(&fitted, settings);
             fitted = prepared.refit(&fitted);
         }

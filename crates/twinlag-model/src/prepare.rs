@@ -141,7 +141,7 @@ impl Prepared {
             base = fit(&model, &self.observations, &self.searched);
         }
         if !self.found.is_empty() {
-            self.find_levels(&base, settings);
+            self.find_levels(&base);
             base = self.refit(&base);
         }
         base
@@ -188,9 +188,9 @@ impl Prepared {
     }
 
     /// Levels again, without what is masked and without the disturbances of `fitted`, unless they were given.
-    pub fn find_levels(&mut self, fitted: &Fitted, settings: &Settings) {
+    pub fn find_levels(&mut self, fitted: &Fitted) {
         let found = defects::levels(&fitted.model.without_disturbances(&fitted.theta, &self.observations));
-        if let (None, Some(found)) = (settings.noise_std_k, found) {
+        if let (false, Some(found)) = (self.levels.is_given, found) {
             self.levels = ChannelNoise { step_k: self.levels.step_k, ..found };
         }
     }
@@ -198,9 +198,9 @@ impl Prepared {
     /// Whether what `fitted` leaves over, of several records in any that has levels of its own, is clearly less than noise of the levels that
     /// there are, as uncertain as these are: the disagreement holds all of the noise, and third differences hold the fastest changes of the
     /// gas as well. Levels that were given are believed.
-    pub fn has_high_levels(&self, fitted: &Fitted, settings: &Settings) -> bool {
+    pub fn has_high_levels(&self, fitted: &Fitted) -> bool {
         let is_coarse = self.levels.coarse_step_k().iter().any(Option::is_some);
-        if settings.noise_std_k.is_some() || fitted.model.noise().is_some() || is_coarse {
+        if self.levels.is_given || fitted.model.noise().is_some() || is_coarse {
             return false;
         }
         if self.observations.has_own_noise() {

@@ -114,7 +114,7 @@ pub fn summarise(
     policy: &Policy,
 ) -> ModelFit {
     let Left { tests, chi2_per_dof, trace } = Left::of(fitted, observations, selection, levels, policy);
-    let rejects = tests.iter().any(|t| t.counts(levels.is_given) && t.p_value < policy.rejection_p_value());
+    let rejects = tests.iter().any(|t| t.can_reject(levels.is_given) && t.p_value < policy.rejection_p_value());
     let covariance = covariance(fitted, observations, selection, rejects);
     let influence = covariance.as_deref().and_then(|c| Influence::of(fitted, observations, selection, c));
     let (time_constants, difference) =

@@ -3,6 +3,7 @@
   const byId = (id) => document.getElementById(id);
   const columnRoles = { time: "time", t1: "T1", t2: "T2" };
   const knownOf = { T1: "known-t1", T2: "known-t2" };
+  const knownInputs = [...Object.values(knownOf), "noise"];
   let files = [];                       // name and bytes of each
   let chosen = {};                      // what the user has said of columns and time; the rest is guessed
   let grouping = {};                    // and of groups of channels: a group's name, or that they are joined
@@ -97,7 +98,7 @@
       forget();
       grouping = {};
       groups = undefined;
-      for (const id of [...Object.values(knownOf), "noise"]) byId(id).value = "";
+      for (const id of knownInputs) byId(id).value = "";
       await readFiles();
     } catch (error) {
       if (mine === generation) warn(`What was dropped cannot be read (${error.message}): drop files, not folders.`);
@@ -107,7 +108,6 @@
   // What was answered is not of what is asked now.
   function forgetAnswer() {
     answered = undefined;
-    byId("noise").setCustomValidity("");
     byId("answer").hidden = byId("gas").hidden = true;
     say("");
   }
@@ -323,8 +323,9 @@
   async function diagnose() {
     if (!checkPeriod() || !checkNoise()) return;
     const answer = await work("diagnose", { options: options() });
-    if (answer) showAnswer(answer);
-    if (answer) say("Diagnosed.");
+    if (!answer) return;
+    showAnswer(answer);
+    say("Diagnosed.");
   }
 
   function showAnswer(answer) {
@@ -376,7 +377,7 @@
     readFiles();
   });
   byId("time-unit").addEventListener("change", ({ target }) => choose("time_unit", target.value || undefined));
-  for (const id of [...Object.values(knownOf), "noise"]) byId(id).addEventListener("input", forgetAnswer);
+  for (const id of knownInputs) byId(id).addEventListener("input", forgetAnswer);
   byId("period").addEventListener("change", () => {
     if (checkPeriod()) choose("period_s", Number(decimal("period")) || undefined);
   });

@@ -20,7 +20,7 @@ use crate::smooth::Form;
 /// exponential of its own, fewer.
 const MAX_EVEN_SAMPLES: usize = 4096;
 const MAX_UNEVEN_SAMPLES: usize = 1024;
-/// Evaluations of it for each candidate: single parts end after ninety at most, combs with 12 and more numbers may use all of them.
+/// Evaluations of it for each candidate: single parts end before, combs of many lines may use all of them.
 const EVALUATIONS_PER_CANDIDATE: u64 = 240;
 /// Edge of the first simplex in the logarithm of each number, and the spread of scores below which a
 /// fit has ended: a tenth of the least gain that counts.

@@ -61,7 +61,8 @@ impl Page<'_> {
         if answer.verdict == Verdict::Unexplained {
             document = document.paragraph(
                 "What to do: see below where in frequency and in time most of it lies, and look for what happens at the \
-                 rig there. Where it is the highest frequencies, the gas may move faster than it is sampled: sample faster. Time constants and gas temperature are biased by it to an extent that the record does not \
+                 rig there. Where it is the highest frequencies, the gas may move faster than it is sampled: sample \
+                 faster. Time constants and gas temperature are biased by it to an extent that the record does not \
                  reveal.",
             );
         } else if answer.effects.is_empty() {
