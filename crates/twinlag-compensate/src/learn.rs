@@ -137,14 +137,14 @@ pub fn learn_quickly(readings: &Readings, rig: &Rig) -> Result<Learned, Compensa
     learned(readings, rig, Ask::GasQuickly, None)
 }
 
-/// Estimates a prior as [`learn`] does, together with the noise levels of both channels. Use it if
-/// the noise of `rig` was estimated without regard to the gas, since gas that is rough from one
-/// sample to the next is then mistaken for noise.
+/// Estimates a prior as [`learn`] does, or as [`learn_from`] where something is `known`, together with the noise levels of both
+/// channels. Use it if the noise of `rig` was estimated without regard to the gas, since gas that is rough from one sample to the
+/// next is then mistaken for noise.
 ///
 /// # Errors
 /// As [`learn`].
-pub fn learn_with_noise(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
-    learned(readings, rig, Ask::GasAndNoise, None)
+pub fn learn_with_noise(readings: &Readings, rig: &Rig, known: Option<&GasParts>) -> Result<Learned, CompensateError> {
+    learned(readings, rig, Ask::GasAndNoise, known)
 }
 
 /// What is asked of the readings.
@@ -175,7 +175,8 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask, from: Option<&GasParts>) ->
     let pooled = periodogram.pooled();
     let search = Search { bins: &periodogram, periodogram: &pooled, limits, room, ask };
     let from = from.map(|parts| parts.within(periodogram.period_s, room)).unwrap_or_default();
-    let (best, mut others) = search.run(from);
+    let beside_noise = |parts: Vec<Part>| search.noise().into_iter().chain(parts).collect();
+    let (best, mut others) = search.run(from.into_iter().map(beside_noise).collect());
     let score = best.score();
     // What was found in pools is fitted to all bins.
     let search = Search { periodogram: &periodogram, ..search };
@@ -287,8 +288,12 @@ impl Search<'_> {
 
     /// The single part that explains most.
     fn first(&self) -> Fitted {
-        let noise = if self.ask == Ask::GasAndNoise { vec![Part::Noise([1.0; 2])] } else { Vec::new() };
-        self.jointly(self.best(&Fitted::unknown(noise), self.kinds().concat()))
+        self.jointly(self.best(&Fitted::unknown(self.noise()), self.kinds().concat()))
+    }
+
+    /// The noise as a part, where it is asked for.
+    fn noise(&self) -> Vec<Part> {
+        if self.ask == Ask::GasAndNoise { vec![Part::Noise([1.0; 2])] } else { Vec::new() }
     }
 
     /// Probability that the gas ends at half the sampling rate, and the parts of `best` as they are then: their

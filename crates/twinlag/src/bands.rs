@@ -156,7 +156,7 @@ impl<'a> Reconstruction<'a> {
         let (_, nominal) = self.rig(theta, [1.0; 2])?;
         let known = self.options.model.as_ref().and_then(|model| model.gas.as_ref());
         let learned = match known {
-            _ if is_found => learn_with_noise(readings, &nominal)?,
+            _ if is_found => learn_with_noise(readings, &nominal, known)?,
             Some(known) => learn_from(readings, &nominal, known)?,
             None => learn(readings, &nominal)?,
         };
@@ -315,7 +315,7 @@ fn is_excessive(gas: &Gas) -> bool {
 fn is_noise_found(options: &CompensateOptions, rig: &Rig) -> bool {
     let given = &options.diagnose.characterise;
     let is_white = rig.mismatch.is_none() && rig.sensors.iter().all(|s| s.coloured.is_none());
-    is_white && options.model.is_none() && given.noise_std_k.is_none() && given.quiet_segments_s.is_empty()
+    is_white && given.noise_std_k.is_none() && given.quiet_segments_s.is_empty()
 }
 
 /// Columns of the Cholesky factor of `covariance`; what is held has none.

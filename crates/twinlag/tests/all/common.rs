@@ -6,13 +6,17 @@ use twinlag::signal::Rig;
 
 /// The record of two sensors in a gas; `seed` of all random numbers, every `period_s`.
 pub(crate) fn record(seed: u64, samples: usize, period_s: f64, gas: &str, sensors: [&str; 2]) -> Record {
+    read(&rig(seed, samples, period_s, gas, sensors))
+}
+
+/// The rig of [`record`].
+pub(crate) fn rig(seed: u64, samples: usize, period_s: f64, gas: &str, sensors: [&str; 2]) -> Rig {
     let [first, second] = sensors;
     let text = format!(
         "seed = {seed}\n[record]\nsamples = {samples}\nsample_period_s = {period_s}\n[gas]\nmean_c = 300.0\n{gas}\n\
          [[sensors]]\nchannel = \"T1\"\n{first}\n[[sensors]]\nchannel = \"T2\"\n{second}\n"
     );
-    let rig: Rig = toml::from_str(&text).expect("a rig");
-    read(&rig)
+    toml::from_str(&text).expect("a rig")
 }
 
 /// What the two sensors of `rig` read.
