@@ -30,6 +30,7 @@ pub(crate) enum Outside {
     /// The nearest point inside, plus a quadratic wall: continuous, for solvers that follow the
     /// gradient. At a bound against which the cost presses, the slope is the wall's, which is zero
     /// there: the solver sees that it has arrived.
+    #[cfg_attr(not(feature = "local"), expect(dead_code, reason = "for solvers that follow gradients"))]
     Wall,
 }
 

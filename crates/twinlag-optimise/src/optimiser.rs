@@ -6,7 +6,9 @@ use crate::ledger::{Ledger, Observer, Refusal, Stop};
 use crate::minimiser::Minimiser;
 use crate::problem::{NoDerivatives, Problem, ProblemError};
 use crate::report::{Budget, End, Fit, Progress};
-use crate::solvers::{brent, levenberg_marquardt, nelder_mead, quasi_newton, trust_region};
+#[cfg(feature = "local")]
+use crate::solvers::{brent, quasi_newton, trust_region};
+use crate::solvers::{levenberg_marquardt, nelder_mead};
 #[cfg(feature = "global")]
 use crate::solvers::{particle_swarm, simulated_annealing, simulated_annealing::Schedule};
 
@@ -97,7 +99,8 @@ impl Default for Optimiser {
 }
 
 impl Optimiser {
-    /// Names of the local solvers, which go downhill from the start, the default first.
+    /// Names of the local solvers, which go downhill from the start, the default first. Those after the second are built with the
+    /// feature `local` of this crate, which is on by default.
     pub const NAMES: [&'static str; 6] = [
         "levenberg-marquardt",
         "nelder-mead",
@@ -112,7 +115,7 @@ impl Optimiser {
     /// are built with the feature `global` of this crate, which is on by default.
     pub const GLOBAL_NAMES: [&'static str; 2] = ["particle-swarm", "simulated-annealing"];
 
-    /// Names of the solvers for one free variable. With more they refuse:
+    /// Names of the solvers for one free variable, built with the feature `local`. With more variables they refuse:
     /// [`ProblemError::OneVariable`].
     pub const ONE_VARIABLE_NAMES: [&'static str; 1] = ["brent"];
 
@@ -162,11 +165,16 @@ impl Optimiser {
 
     /// That this build has the solver.
     fn check_built(&self) -> Result<(), ProblemError> {
-        let is_global = matches!(self, Self::ParticleSwarm { .. } | Self::SimulatedAnnealing { .. });
-        if is_global && !cfg!(feature = "global") {
-            return Err(ProblemError::NotBuilt { optimiser: self.name() });
-        }
-        Ok(())
+        let (feature, is_built) = match self {
+            Self::LevenbergMarquardt { .. } | Self::NelderMead { .. } => return Ok(()),
+            Self::LBfgs { .. }
+            | Self::Bfgs { .. }
+            | Self::NewtonTrustRegionSteihaug { .. }
+            | Self::NewtonTrustRegionDogleg { .. }
+            | Self::Brent { .. } => ("local", cfg!(feature = "local")),
+            Self::ParticleSwarm { .. } | Self::SimulatedAnnealing { .. } => ("global", cfg!(feature = "global")),
+        };
+        if is_built { Ok(()) } else { Err(ProblemError::NotBuilt { optimiser: self.name(), feature }) }
     }
 
     fn follows_gradients(&self) -> bool {
@@ -205,9 +213,13 @@ impl Optimiser {
         match *self {
             Self::LevenbergMarquardt { step_tolerance } => levenberg_marquardt::run(ledger, step_tolerance),
             Self::NelderMead { spread_tolerance, edge } => nelder_mead::run(ledger, spread_tolerance, edge),
+            #[cfg(feature = "local")]
             Self::LBfgs { memory, gradient_tolerance } => quasi_newton::l_bfgs(ledger, memory, gradient_tolerance),
+            #[cfg(feature = "local")]
             Self::Bfgs { gradient_tolerance } => quasi_newton::bfgs(ledger, gradient_tolerance),
+            #[cfg(feature = "local")]
             Self::NewtonTrustRegionSteihaug { step_tolerance } => trust_region::steihaug(ledger, step_tolerance),
+            #[cfg(feature = "local")]
             Self::NewtonTrustRegionDogleg { step_tolerance } => trust_region::dogleg(ledger, step_tolerance),
             #[cfg(feature = "global")]
             Self::ParticleSwarm { particles, generations, seed } => {
@@ -217,11 +229,10 @@ impl Optimiser {
             Self::SimulatedAnnealing { sweeps, moves, temperature, cooling, seed } => {
                 simulated_annealing::run(ledger, Schedule { sweeps, moves, temperature, cooling }, seed)
             }
-            #[cfg(not(feature = "global"))]
-            Self::ParticleSwarm { .. } | Self::SimulatedAnnealing { .. } => {
-                unreachable!("a fit begins with a check that its solver is built")
-            }
+            #[cfg(feature = "local")]
             Self::Brent { step_tolerance } => brent::run(ledger, step_tolerance),
+            #[cfg(not(all(feature = "local", feature = "global")))]
+            _ => unreachable!("a fit begins with a check that its solver is built"),
         }
     }
 
@@ -306,7 +317,7 @@ impl Minimiser for Optimiser {
     }
 }
 
-#[cfg(all(test, not(feature = "global")))]
+#[cfg(all(test, not(any(feature = "local", feature = "global"))))]
 mod tests {
     use super::*;
 
@@ -327,7 +338,9 @@ mod tests {
         let by_name = Optimiser::by_name("particle-swarm").expect_err("not built");
         assert_eq!(by_options, by_name);
         assert!(by_name.to_string().contains("feature `global`"), "{by_name}");
-        assert!(Optimiser::by_name("simulated-annealing").is_err());
-        assert!(Optimiser::NAMES.into_iter().all(|name| Optimiser::by_name(name).is_ok()));
+        let brent = Optimiser::by_name("brent").expect_err("not built");
+        assert!(brent.to_string().contains("feature `local`"), "{brent}");
+        let built = Optimiser::names().filter(|name| Optimiser::by_name(name).is_ok());
+        assert_eq!(built.collect::<Vec<_>>(), ["levenberg-marquardt", "nelder-mead"]);
     }
 }

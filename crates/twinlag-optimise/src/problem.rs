@@ -141,8 +141,8 @@ pub enum ProblemError {
     NoStart,
     #[error("there is no optimiser called \"{name}\"; there are {known}")]
     UnknownOptimiser { name: String, known: String },
-    #[error("{optimiser} is not part of this build: it needs the feature `global`")]
-    NotBuilt { optimiser: String },
+    #[error("{optimiser} is not part of this build: it needs the feature `{feature}`")]
+    NotBuilt { optimiser: String, feature: &'static str },
 }
 
 /// A cost with its variables.

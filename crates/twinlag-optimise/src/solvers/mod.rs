@@ -2,7 +2,9 @@
 //!
 //! All begin at the best point that the ledger knows, and leave the ledger to say where they ended.
 
+#[cfg(feature = "local")]
 pub(crate) mod brent;
+#[cfg(feature = "local")]
 mod dogleg;
 pub(crate) mod levenberg_marquardt;
 pub(crate) mod nelder_mead;
@@ -10,9 +12,11 @@ pub(crate) mod nelder_mead;
 pub(crate) mod particle_swarm;
 #[cfg(feature = "global")]
 mod polish;
+#[cfg(feature = "local")]
 pub(crate) mod quasi_newton;
 #[cfg(feature = "global")]
 mod random;
 #[cfg(feature = "global")]
 pub(crate) mod simulated_annealing;
+#[cfg(feature = "local")]
 pub(crate) mod trust_region;
