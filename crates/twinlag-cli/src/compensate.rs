@@ -4,14 +4,14 @@ use std::path::Path;
 
 use twinlag::diagnosis::Verdict;
 use twinlag::record::Record;
-use twinlag::{CompensateOptions, Compensation, DiagnoseOptions, Options, Status};
+use twinlag::{CompensateOptions, Compensation, DiagnoseOptions, Kept, Options, Status};
 
 use crate::arguments::{Compensate, Trust};
 use crate::characterise::model;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
-use crate::keep::{Kept, with_kept};
+use crate::keep::{self, kept};
 use crate::output::{self, Views};
 use crate::print;
 use crate::progress::Progress;
@@ -31,7 +31,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     if let Some(model) = &model {
         with_sensors(&mut record, &model.channels, "the model", &profile, console);
     }
-    Kept::check(&command.input.file, &profile, &command.keep, &record, console)?;
+    keep::check(&command.input.file, &profile, &command.keep, &record, console)?;
     print::notes(&record, console);
     let plausibility = command.physics.plausibility(std::slice::from_ref(&record))?;
     let run = |characterise: Options| {
@@ -45,7 +45,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     };
     let answer = plausibility.answer(asked, run, |answer| &mut answer.last)?;
     if answer.status == Status::Ok {
-        let kept = Kept::of(&command.input.file, &profile, &command.keep, &record, console)?;
+        let kept = kept(&command.input.file, &profile, &command.keep, &record, console)?;
         write_gas(&answer, kept.as_ref(), &command.out, to_stdout)?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::gas_picture(&record, &answer)?)?;
@@ -77,11 +77,7 @@ pub(crate) fn write_gas(
     out: &Path,
     to_stdout: bool,
 ) -> Result<(), Failure> {
-    let columns: [(&str, &[f64]); 3] =
-        [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];
-    let grades = answer.time_s.iter().map(|_| answer.judgement.grade.to_string());
-    let (header, cells) = with_kept("grade", grades, kept);
-    output::data(out, to_stdout, &columns, (&header, cells))
+    output::data(out, to_stdout, |out| answer.write_csv(out, kept))
 }
 
 /// The exit code of a compensation, which is asked for the gas temperature.

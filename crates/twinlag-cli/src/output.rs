@@ -1,12 +1,12 @@
 //! Output files: checked before the work begins, and overwritten only if the user asks for it.
 
 use std::fs::File;
-use std::io::{BufWriter, ErrorKind, Write, stdout};
+use std::io::{ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 use twinlag::Model;
-use twinlag::record::{Decimals, RecordError, write_csv};
+use twinlag::record::RecordError;
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -100,19 +100,14 @@ pub(crate) fn model(path: &Path, model: &Model) -> Result<(), Failure> {
     write(path, text.map_err(|e| Failure::Other(format!("the model cannot be written as JSON: {e}")))?)
 }
 
-/// Writes a table of numbers, row by row, to a file or to standard output, with text after each row.
-///
-/// - `last`: what stands behind the names of the numbers, and behind each row
+/// Writes a table of numbers, row by row, to a file or to standard output.
 pub(crate) fn data(
     out: &Path,
     to_stdout: bool,
-    columns: &[(&str, &[f64])],
-    last: (&str, impl Iterator<Item = String>),
+    write_csv: impl FnOnce(&mut UntilClosed<&mut dyn Write>) -> Result<(), RecordError>,
 ) -> Result<(), Failure> {
-    let cells = std::iter::once(last.0.to_owned()).chain(last.1);
     let written = |out: &mut dyn Write, name: &str| {
-        let mut rows = WithCells { out: UntilClosed::new(BufWriter::new(out)), cells };
-        write_csv(&mut rows, columns, Decimals::Shortest).map_err(|error| match error {
+        write_csv(&mut UntilClosed::new(out)).map_err(|error| match error {
             RecordError::CannotWrite { reason } => Failure::Other(format!("{name}: cannot be written: {reason}")),
             other => twinlag::Error::from(other).into(),
         })
@@ -195,31 +190,6 @@ impl<W: Write> Write for UntilClosed<W> {
     fn flush(&mut self) -> std::io::Result<()> {
         let flushed = self.out.flush();
         self.unless_closed(flushed)
-    }
-}
-
-/// A table that gets a cell at the end of each row.
-struct WithCells<W, I> {
-    out: W,
-    cells: I,
-}
-
-impl<W: Write, I: Iterator<Item = String>> Write for WithCells<W, I> {
-    fn write(&mut self, text: &[u8]) -> std::io::Result<usize> {
-        for part in text.split_inclusive(|byte| *byte == b'\n') {
-            match part.strip_suffix(b"\n") {
-                Some(row) => {
-                    self.out.write_all(row)?;
-                    writeln!(self.out, ",{}", self.cells.next().unwrap_or_default())?;
-                }
-                None => self.out.write_all(part)?,
-            }
-        }
-        Ok(text.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.out.flush()
     }
 }
 
@@ -336,17 +306,5 @@ mod tests {
             assert!(std::fs::symlink_metadata(&link).is_ok_and(|link| link.is_symlink()));
             assert_eq!(std::fs::read(&file).expect("is there"), text.as_bytes());
         }
-    }
-
-    /// Text may come in pieces that end anywhere.
-    #[test]
-    fn each_row_gets_its_cell() {
-        let mut out = Vec::new();
-        let cells = ["grade", "go", "no-go"].map(str::to_owned).into_iter();
-        let mut rows = WithCells { out: &mut out, cells };
-        for piece in ["a,", "b\n1,2\n3", ",4", "\n"] {
-            rows.write_all(piece.as_bytes()).expect("memory");
-        }
-        assert_eq!(String::from_utf8_lossy(&out), "a,b,grade\n1,2,go\n3,4,no-go\n");
     }
 }

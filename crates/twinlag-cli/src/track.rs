@@ -7,7 +7,7 @@ use crate::characterise::model;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
-use crate::keep::{Kept, with_kept};
+use crate::keep::{self, kept};
 use crate::live;
 use crate::output::{self, Views};
 use crate::print;
@@ -33,7 +33,7 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
     if let Some(model) = &options.model {
         with_sensors(&mut record, &model.channels, "the model", &profile, console);
     }
-    Kept::check(&command.input.file, &profile, &command.keep, &record, console)?;
+    keep::check(&command.input.file, &profile, &command.keep, &record, console)?;
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("tracking {} samples", record.len()));
@@ -41,19 +41,8 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
             .map_err(|error| Failure::in_file(error, &record.source))?
     };
     if !answer.time_s.is_empty() {
-        let [one, two] = &answer.sensors;
-        let columns: [(&str, &[f64]); 7] = [
-            ("time_s", &answer.time_s),
-            ("tau1_s", &one.tau_s),
-            ("tau1_low_s", &one.low_s),
-            ("tau1_high_s", &one.high_s),
-            ("tau2_s", &two.tau_s),
-            ("tau2_low_s", &two.low_s),
-            ("tau2_high_s", &two.high_s),
-        ];
-        let kept = Kept::of(&command.input.file, &profile, &command.keep, &record, console)?;
-        let (header, cells) = with_kept("grade", answer.grades.iter().map(ToString::to_string), kept.as_ref());
-        output::data(&command.out, to_stdout, &columns, (&header, cells))?;
+        let kept = kept(&command.input.file, &profile, &command.keep, &record, console)?;
+        output::data(&command.out, to_stdout, |out| answer.write_csv(out, kept.as_ref()))?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::track_picture(&answer)?)?;
         }

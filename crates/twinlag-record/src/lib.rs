@@ -89,4 +89,4 @@ pub use selection::{ColumnRef, SamplingChoice, Selection, Setting};
 pub use sign::{Decimal, Delimiter};
 pub use table::Table;
 pub use unit::Unit;
-pub use write::{Decimals, write_csv};
+pub use write::{Decimals, TextColumn, write_csv, write_csv_with_text};

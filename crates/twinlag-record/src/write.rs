@@ -1,6 +1,7 @@
 //! Columns of numbers as comma-separated text with decimal points: what this crate, and everything
 //! else, can read.
 
+use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
 
 use crate::RecordError;
@@ -34,6 +35,35 @@ pub enum Decimals {
 /// # Errors
 /// [`RecordError::LengthMismatch`], [`RecordError::CannotWrite`].
 pub fn write_csv(out: &mut impl Write, columns: &[(&str, &[f64])], decimals: Decimals) -> Result<(), RecordError> {
+    write_csv_with_text(out, columns, &[], decimals)
+}
+
+/// A column of text: its name, and the cell of each row, counted from 0.
+pub type TextColumn<'a> = (&'a str, Box<dyn Fn(usize) -> String + 'a>);
+
+/// Writes as [`write_csv`] does, with columns of text behind those of numbers.
+///
+/// - `columns`: name and values, `[n]` each
+/// - `text`: name and cells, which are asked for `0..n`
+///
+/// ```
+/// use twinlag_record::{Decimals, TextColumn, write_csv_with_text};
+///
+/// let mut out = Vec::new();
+/// let grade: TextColumn<'_> = ("grade", Box::new(|row| ["go", "no-go"][row].to_owned()));
+/// write_csv_with_text(&mut out, &[("tau_s", &[0.1, f64::NAN])], &[grade], Decimals::Shortest)?;
+/// assert_eq!(String::from_utf8(out)?, "tau_s,grade\n0.1,go\n,no-go\n");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// As [`write_csv`].
+pub fn write_csv_with_text(
+    out: &mut impl Write,
+    columns: &[(&str, &[f64])],
+    text: &[TextColumn<'_>],
+    decimals: Decimals,
+) -> Result<(), RecordError> {
     let rows = columns.first().map_or(0, |column| column.1.len());
     for (name, values) in columns {
         if values.len() != rows {
@@ -46,18 +76,20 @@ pub fn write_csv(out: &mut impl Write, columns: &[(&str, &[f64])], decimals: Dec
             });
         }
     }
-    write_rows(out, columns, rows, decimals).map_err(|error| RecordError::CannotWrite { reason: error.to_string() })
+    write_rows(out, columns, text, rows, decimals)
+        .map_err(|error| RecordError::CannotWrite { reason: error.to_string() })
 }
 
-fn write_rows(out: &mut impl Write, columns: &[(&str, &[f64])], rows: usize, decimals: Decimals) -> io::Result<()> {
+fn write_rows(
+    out: &mut impl Write,
+    columns: &[(&str, &[f64])],
+    text: &[TextColumn<'_>],
+    rows: usize,
+    decimals: Decimals,
+) -> io::Result<()> {
     let mut out = BufWriter::new(out);
-    for (at, (name, _)) in columns.iter().enumerate() {
-        let comma = if at == 0 { "" } else { "," };
-        if name.contains([',', '"', '\n', '\r']) {
-            write!(out, "{comma}\"{}\"", name.replace('"', "\"\""))?;
-        } else {
-            write!(out, "{comma}{name}")?;
-        }
+    for (at, name) in columns.iter().map(|column| column.0).chain(text.iter().map(|column| column.0)).enumerate() {
+        write!(out, "{}{}", if at == 0 { "" } else { "," }, quoted(name))?;
     }
     writeln!(out)?;
     for row in 0..rows {
@@ -71,7 +103,19 @@ fn write_rows(out: &mut impl Write, columns: &[(&str, &[f64])], rows: usize, dec
                 (value, Decimals::Fixed(digits)) => write!(out, "{value:.digits$}")?,
             }
         }
+        for (_, cell) in text {
+            write!(out, ",{}", quoted(&cell(row)))?;
+        }
         writeln!(out)?;
     }
     out.flush()
+}
+
+/// A cell of comma-separated text.
+fn quoted(text: &str) -> Cow<'_, str> {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\"")).into()
+    } else {
+        text.into()
+    }
 }

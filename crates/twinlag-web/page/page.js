@@ -10,6 +10,7 @@
   let groups;                           // of the first file, once they are read
   let generation = 0;                   // a reply to an older question is out of date
   let worker, started, isWorking = false;
+  let reading;                          // ends once the files are read as they are chosen
   const waiting = new Map();            // requests that are not answered, by number
   let requests = 0;
   const links = { answer: [], gas: [] };
@@ -90,6 +91,7 @@
     const taken = [...list];
     if (taken.length === 0) return;
     const mine = ++generation;
+    byId("asking").hidden = true;
     byId("read").replaceChildren(element("p", "Reading …"));
     try {
       const read = await Promise.all(taken.map(async (file) => ({ name: file.name, bytes: await file.arrayBuffer() })));
@@ -117,13 +119,17 @@
     for (const id of ["period", "time-unit"]) byId(id).value = "";
   }
 
-  // Reads all files anew, with what is chosen.
-  async function readFiles() {
+  // Reads all files anew, with what is chosen. A question that is asked meanwhile waits for it.
+  function readFiles() {
+    reading = readAsChosen();
+    return reading;
+  }
+
+  async function readAsChosen() {
     if (files.length === 0) return;
     const mine = ++generation;
     const wasWorking = isWorking;
     if (wasWorking) await restart();
-    byId("asking").hidden = true;
     forgetAnswer();
     if (wasWorking) say("Stopped, since the files or columns are others now.");
     try {
@@ -141,6 +147,7 @@
       byId("asking").hidden = !found.every(({ inspection }) => inspection?.record);
     } catch (error) {
       if (error.isBroken) await restart();
+      if (mine === generation) byId("asking").hidden = true;
       if (mine === generation && !error.isEnded) warn(`The files cannot be read in this page: ${error.message}.`);
     }
   }
@@ -322,6 +329,8 @@
 
   async function diagnose() {
     if (!checkPeriod() || !checkNoise()) return;
+    await reading;
+    if (isWorking || byId("asking").hidden) return;
     const answer = await work("diagnose", { options: options() });
     if (!answer) return;
     showAnswer(answer);

@@ -6,7 +6,7 @@ use thiserror::Error;
 use twinlag::record::{Decimals, Record, RecordError, Selection, Table, write_csv};
 use twinlag::signal::{Rig, SignalError};
 use twinlag::{
-    CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Inspection, Options, Status, Watch,
+    CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Inspection, Kept, Options, Status, Watch,
     compensate_watched, diagnose_records_watched, diagnose_watched, inspect, joined,
 };
 use twinlag_files::{Choice, FileError, are_binary, contents_of_bytes, read_bytes};
@@ -70,7 +70,11 @@ impl Session {
         let rig: Rig = parsed(EXAMPLE_RIG)?;
         let simulated = rig.simulate()?;
         let [t1, t2] = simulated.channels.each_ref().map(|channel| format!("{channel}_C"));
-        csv(&[("time_s", &simulated.time_s), (&t1, &simulated.t1_c), (&t2, &simulated.t2_c)]).map_err(Into::into)
+        let columns: [(&str, &[f64]); 3] =
+            [("time_s", &simulated.time_s), (&t1, &simulated.t1_c), (&t2, &simulated.t2_c)];
+        let mut text = Vec::new();
+        write_csv(&mut text, &columns, Decimals::Shortest)?;
+        Ok(String::from_utf8_lossy(&text).into_owned())
     }
 
     /// The sheets or groups of channels of a file, as a JSON array of pairs: its name, and what it holds. None of text.
@@ -174,16 +178,31 @@ impl Session {
         Ok(gas_report(&first[0].record, gas, &making(first, made_at))?)
     }
 
-    /// The gas temperature as CSV, in the columns of `twinlag compensate`; `None` where there is none to give.
+    /// The gas temperature as CSV, as `twinlag compensate` writes it, with the dates and times of the first file, which is given once
+    /// more; `None` where there is none to give.
+    ///
+    /// - `name`, `selection`, `group`, `join`: as of [`Session::add`]
     ///
     /// # Errors
-    /// [`SessionError::Order`] before [`Session::compensate`].
-    pub fn gas_csv(&self) -> Result<Option<String>, SessionError> {
+    /// [`SessionError::Order`] before [`Session::compensate`]; those of [`Session::add`].
+    pub fn gas_csv(
+        &self,
+        name: &str,
+        bytes: Vec<u8>,
+        selection: &str,
+        group: Option<String>,
+        join: bool,
+    ) -> Result<Option<String>, SessionError> {
         let gas = self.gas()?;
         if gas.status != Status::Ok {
             return Ok(None);
         }
-        Ok(Some(csv(&[("time_s", &gas.time_s), ("gas_C", &gas.gas_c), ("gas_std_K", &gas.gas_std_k)])?))
+        let selection: Selection = parsed(selection)?;
+        let choice = Choice { group, join, ..Choice::of(&selection) };
+        let kept = Kept::of(table(name, bytes, &choice)?, &selection, &[], &self.added[0].record)?;
+        let mut text = Vec::new();
+        gas.write_csv(&mut text, kept.as_ref())?;
+        Ok(Some(String::from_utf8_lossy(&text).into_owned()))
     }
 
     /// The model that was found, as `twinlag diagnose --save` writes it.
@@ -217,12 +236,6 @@ fn making(added: &[Added], made_at: &str) -> Making {
 fn parsed<T: DeserializeOwned>(json: &str) -> Result<T, SessionError> {
     // Through a value: the place of what is wrong in a text that the page has written is nothing to its reader.
     Ok(T::deserialize(serde_json::from_str::<serde_json::Value>(json)?)?)
-}
-
-fn csv(columns: &[(&str, &[f64])]) -> Result<String, RecordError> {
-    let mut text = Vec::new();
-    write_csv(&mut text, columns, Decimals::Shortest)?;
-    Ok(String::from_utf8_lossy(&text).into_owned())
 }
 
 /// The table of a file in memory, in whatever format it is.

@@ -47,11 +47,12 @@ fn a_session_diagnoses_as_the_library_does() {
     assert_eq!(model, serde_json::to_string_pretty(&wanted.model()).expect("JSON"));
 
     session.compensate(&model, &unwatched).expect("an answer");
-    let csv = session.gas_csv().expect("in order").expect("a gas temperature");
+    let csv = session.gas_csv("run.csv", example(ROWS), "{}", None, false);
+    let csv = csv.expect("in order").expect("a gas temperature");
     let options = CompensateOptions { model: Some(wanted.model()), ..CompensateOptions::default() };
     let gas = compensate(&record, &options).expect("an answer");
     let last = gas.gas_c.last().expect("a gas temperature");
-    assert_eq!((csv.lines().next(), csv.lines().count()), (Some("time_s,gas_C,gas_std_K"), ROWS + 1));
+    assert_eq!((csv.lines().next(), csv.lines().count()), (Some("time_s,gas_C,gas_std_K,grade"), ROWS + 1));
     assert_eq!(csv.lines().last().and_then(|row| row.split(',').nth(1)?.parse().ok()), Some(*last));
     assert!(session.gas_report("").expect("a report").contains("run.csv"));
     // A new diagnosis is of no gas temperature yet.
@@ -101,7 +102,32 @@ fn what_comes_before_something_else_is_named() {
     let refused = |error: SessionError| error.to_string();
     assert_eq!(session.diagnose("{}", &unwatched).map_err(refused), Err("expected a record before this".to_owned()));
     assert_eq!(session.report("").map_err(refused), Err("expected a diagnosis before this".to_owned()));
-    assert_eq!(session.gas_csv().map_err(refused), Err("expected a gas temperature before this".to_owned()));
+    let csv = session.gas_csv("run.csv", short(), "{}", None, false);
+    assert_eq!(csv.map_err(refused), Err("expected a gas temperature before this".to_owned()));
+}
+
+/// Where rows of the file are not those of the record, nothing is put beside it.
+#[test]
+fn stamps_of_the_file_stand_beside_its_gas_temperature() {
+    const ROWS: usize = 2500;
+    let example = String::from_utf8(example(ROWS)).expect("text");
+    let stamped = |(row, line): (usize, &str)| {
+        let readings = &line[line.find(',').expect("three columns")..];
+        let clock = format!("2026-05-01 10:00:{:06.3}", 0.002 * (row as f64 - 1.0));
+        if row == 0 { format!("when{readings}") } else { format!("{clock}{readings}") }
+    };
+    let file = example.lines().enumerate().map(stamped).collect::<Vec<_>>().join("\n").into_bytes();
+    let mut session = Session::default();
+    session.add("run.csv", file.clone(), "{}", None, false).expect("a table");
+    session.diagnose("{}", &unwatched).expect("an answer");
+    let model = session.model().expect("a model");
+    session.compensate(&model, &unwatched).expect("an answer");
+    let csv = session.gas_csv("run.csv", file.clone(), "{}", None, false);
+    let csv = csv.expect("in order").expect("a gas temperature");
+    assert_eq!(csv.lines().next(), Some("time_s,gas_C,gas_std_K,grade,when"));
+    assert!(csv.lines().nth(101).is_some_and(|row| row.ends_with(",2026-05-01 10:00:00.200")));
+    let shorter = file[..file.len() / 2].to_vec();
+    assert!(session.gas_csv("run.csv", shorter, "{}", None, false).is_err_and(|e| e.to_string().contains("2500")));
 }
 
 #[test]

@@ -75,6 +75,7 @@
 mod answers;
 mod bands;
 mod error;
+mod kept;
 mod options;
 mod parallel;
 mod plausibility;
@@ -93,6 +94,7 @@ pub use answers::{
     RecordNumber, RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track, TransferAnswer, TransferError,
 };
 pub use error::Error;
+pub use kept::Kept;
 pub use options::Options;
 pub use plausibility::{Plausibility, TypicalSensor};
 pub use reference::AgainstReference;

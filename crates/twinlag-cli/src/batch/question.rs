@@ -9,14 +9,14 @@ use serde_json::{Value, json};
 use twinlag::compensation::Form;
 use twinlag::diagnosis::Identifier;
 use twinlag::record::{ColumnRef, Record};
-use twinlag::{Characterisation, CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Model, Options};
+use twinlag::{Characterisation, CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Kept, Model, Options};
 use twinlag_batch::{Answer, Found, GroupBy, Outcome, Row, Unit, Verb as RowVerb, each, grouped, map};
 
 use super::{Batch, GAS_ENDING, SILENT, Verb, unit_name};
 use crate::arguments::{Physics, Trust};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::keep::Kept;
+use crate::keep::kept;
 use crate::output::with_ending;
 use crate::profile::Profile;
 use crate::read::{read_watched, table_watched};
@@ -233,7 +233,7 @@ impl<'a> Question<'a> {
                 let rows = Row::of(unit, outcome, &Answer::Compensation(&answer));
                 match gas_file.filter(|_| answer.gas.is_some()) {
                     Some(path) => {
-                        let kept = Kept::of(&unit.files()[0], &self.profile, self.keep, &records[0], SILENT)?;
+                        let kept = kept(&unit.files()[0], &self.profile, self.keep, &records[0], SILENT)?;
                         write_gas(&answer, kept.as_ref(), path)?;
                         rows.into_iter().map(|row| row.with_gas_file(path)).collect()
                     }

@@ -1,13 +1,16 @@
 //! The gas temperature of a record: schema `twinlag.compensation/1`.
 
+use std::io::Write;
+
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{Form, Prior, Rig};
 use twinlag_diagnose::{Judgement, Verdict};
-use twinlag_record::Record;
+use twinlag_record::{Decimals, Record, RecordError, TextColumn, write_csv_with_text};
 
 use crate::answers::diagnosis::explained;
 use crate::answers::{Characterisation, FoundIn, Model, NamedEffect, Status};
 use crate::bands::GasFault;
+use crate::kept::Kept;
 use crate::reference::AgainstReference;
 
 /// How good a gas temperature is.
@@ -113,5 +116,19 @@ impl Compensation {
             model.found_in = Some(FoundIn::of(record));
         }
         Some(model)
+    }
+
+    /// Writes the gas temperature as comma-separated text: `time_s`, `gas_C`, `gas_std_K`, `grade`, and what is kept of the record's
+    /// table.
+    ///
+    /// # Errors
+    /// [`RecordError::CannotWrite`].
+    pub fn write_csv(&self, out: &mut impl Write, kept: Option<&Kept>) -> Result<(), RecordError> {
+        let columns: [(&str, &[f64]); 3] =
+            [("time_s", &self.time_s), ("gas_C", &self.gas_c), ("gas_std_K", &self.gas_std_k)];
+        let grade: TextColumn<'_> = ("grade", Box::new(|_| self.judgement.grade.to_string()));
+        let kept = kept.map(|kept| kept.columns(self.time_s.len())).unwrap_or_default();
+        let text: Vec<TextColumn<'_>> = std::iter::once(grade).chain(kept).collect();
+        write_csv_with_text(out, &columns, &text, Decimals::Shortest)
     }
 }

@@ -1,9 +1,13 @@
 //! Time constants along a record: schema `twinlag.track/1`.
 
+use std::io::Write;
+
 use serde::{Deserialize, Serialize};
 use twinlag_diagnose::{ChangePoint, Grade, Judgement, RatioTest};
+use twinlag_record::{Decimals, RecordError, TextColumn, write_csv_with_text};
 
 use crate::answers::{Characterisation, Status};
+use crate::kept::Kept;
 
 /// One sensor's time constant along the record.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -72,4 +76,26 @@ pub struct Track {
 impl Track {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.track/1";
+
+    /// Writes both time constants with the ends of their 95 % bands as comma-separated text: `time_s`, `tau1_s`, `tau1_low_s`,
+    /// `tau1_high_s`, the same of `tau2`, `grade`, and what is kept of the record's table.
+    ///
+    /// # Errors
+    /// [`RecordError::CannotWrite`].
+    pub fn write_csv(&self, out: &mut impl Write, kept: Option<&Kept>) -> Result<(), RecordError> {
+        let [one, two] = &self.sensors;
+        let columns: [(&str, &[f64]); 7] = [
+            ("time_s", &self.time_s),
+            ("tau1_s", &one.tau_s),
+            ("tau1_low_s", &one.low_s),
+            ("tau1_high_s", &one.high_s),
+            ("tau2_s", &two.tau_s),
+            ("tau2_low_s", &two.low_s),
+            ("tau2_high_s", &two.high_s),
+        ];
+        let grade: TextColumn<'_> = ("grade", Box::new(|sample| self.grades[sample].to_string()));
+        let kept = kept.map(|kept| kept.columns(self.time_s.len())).unwrap_or_default();
+        let text: Vec<TextColumn<'_>> = std::iter::once(grade).chain(kept).collect();
+        write_csv_with_text(out, &columns, &text, Decimals::Shortest)
+    }
 }

@@ -55,7 +55,7 @@ fn time_constants_that_stay_are_followed_in_a_gas_rougher_than_the_sampling() {
     }
 }
 
-/// The gas changes by half of its standard deviation from sample to sample, so that levels that are found without it are wrong, and 86 %
+/// The gas changes by half of its standard deviation from sample to sample, so that levels that are found without it are wrong, and 83 %
 /// of the gas were inside the bands as long as a model that was given kept them. Errors of the gas are correlated over the slower
 /// time constant, 15 samples, so that four records hold 800 independent ones and a share of 95 % is good to 0.8 %; four of these.
 #[test]

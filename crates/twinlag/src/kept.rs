@@ -1,0 +1,89 @@
+//! Columns of a table that go to an output as they are.
+
+use std::collections::HashSet;
+
+use twinlag_record::{ColumnRef, Kind, Record, RecordError, Selection, Table, TextColumn};
+
+use crate::error::Error;
+use crate::rows::rows_of_samples;
+
+/// The word for all columns that are not read as time or temperature.
+const ALL: &str = "all";
+
+/// Columns of the table of a record, by the samples of an answer: its dates and times of day, and others that are asked for.
+///
+/// ```
+/// use twinlag::Kept;
+/// use twinlag::record::{Record, Selection, Table};
+///
+/// let text: String = (0..60).map(|k| format!("2026-05-01 10:00:{k:02},2{}.5,2{}.1,run {k}\n", k % 7, k % 5)).collect();
+/// let table = || Table::parse(&format!("when,T1 (C),T2 (C),note\n{text}"), "run.csv");
+/// let record = Record::from_table(table()?, &Selection::default())?;
+/// let kept = Kept::of(table()?, &Selection::default(), &["note".parse()?], &record)?.expect("there are stamps");
+/// let columns = kept.columns(60);
+/// assert_eq!((columns[0].0, (columns[0].1)(7)), ("when", "2026-05-01 10:00:07".to_owned()));
+/// assert_eq!((columns[1].0, (columns[1].1)(7)), ("note", "run 7".to_owned()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Kept {
+    table: Table,
+    columns: Vec<usize>,
+    /// The row of each sample.
+    rows: Vec<Option<usize>>,
+}
+
+impl Kept {
+    /// Keeps columns of `table`, which `record` is of; `None` where there is nothing to keep.
+    ///
+    /// - `named`: the columns to keep beside dates and times, or `all` for every one that `selection` does not read
+    ///
+    /// # Errors
+    /// [`Error::Record`] of columns that the table does not have, and of a table with other rows than the record.
+    pub fn of(
+        table: Table,
+        selection: &Selection,
+        named: &[ColumnRef],
+        record: &Record,
+    ) -> Result<Option<Self>, Error> {
+        if table.rows() != record.len() {
+            return Err(Error::Record(RecordError::LengthMismatch {
+                file: table.source().to_owned(),
+                name: "each column".to_owned(),
+                found: table.rows(),
+                like: "the record".to_owned(),
+                expected: record.len(),
+            }));
+        }
+        let selection = table.resolved(selection)?;
+        let is_stamp = |index: &usize| table.columns()[*index].kind() == Kind::Stamp;
+        let mut columns: Vec<usize> = (0..table.columns().len()).filter(is_stamp).collect();
+        for name in named {
+            if name.to_string() == ALL {
+                let read = [&selection.time, &selection.t1, &selection.t2].into_iter().flatten();
+                let read: Vec<usize> = read.map(|column| table.find(column)).collect::<Result<_, _>>()?;
+                columns.extend((0..table.columns().len()).filter(|index| !read.contains(index)));
+            } else {
+                columns.push(table.find(name)?);
+            }
+        }
+        let mut seen = HashSet::new();
+        columns.retain(|column| seen.insert(*column));
+        Ok((!columns.is_empty()).then(|| Self { columns, rows: rows_of_samples(record), table }))
+    }
+
+    /// The columns for an output of so many samples. A cell is empty of a sample that is missing in the table, and all are where
+    /// the answer has other instants than the record.
+    pub fn columns(&self, samples: usize) -> Vec<TextColumn<'_>> {
+        let row_of =
+            move |sample: usize| self.rows.get(sample).copied().flatten().filter(|_| samples == self.rows.len());
+        let cell = move |column: usize, sample: usize| {
+            row_of(sample).map_or(String::new(), |row| self.table.cell(column, row))
+        };
+        let named = |column: &usize| -> TextColumn<'_> {
+            let column = *column;
+            (self.table.columns()[column].name(), Box::new(move |sample| cell(column, sample)))
+        };
+        self.columns.iter().map(named).collect()
+    }
+}
