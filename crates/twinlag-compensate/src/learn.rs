@@ -54,6 +54,19 @@ const ENDS_BEFORE: f64 = 0.1;
 /// Priors beside the best one, at most.
 const MAX_ALTERNATIVES: usize = 4;
 
+/// How far numbers are fitted.
+struct Effort {
+    iterations: u64,
+    /// Of the logarithm of a number.
+    step_tolerance: f64,
+}
+
+/// Of a candidate among many, of the few that are left of these, and of all parts together: these fits have to end where rounding
+/// does not decide, since compilers and processors round differently.
+const BEGUN: Effort = Effort { iterations: 3, step_tolerance: 1e-3 };
+const ADDED: Effort = Effort { iterations: 12, step_tolerance: 1e-3 };
+const CONVERGED: Effort = Effort { iterations: 100, step_tolerance: 1e-9 };
+
 /// A prior for the gas, and how well the readings determine it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Learned {
@@ -357,7 +370,11 @@ impl Search<'_> {
         if !has_gas(&current.parts) || (current.parts.len() == 1 && current.deviance.is_finite()) {
             return current;
         }
-        let mut fitted = self.fit(&current.parts, &self.beside(&current.parts), 25);
+        let mut fitted = self.fit(&current.parts, &self.beside(&current.parts), &CONVERGED);
+        if fitted.parts.iter().any(|part| part.simpler().is_some()) {
+            let simpler: Vec<Part> = fitted.parts.into_iter().map(|part| part.simpler().unwrap_or(part)).collect();
+            fitted = self.fit(&simpler, &self.beside(&simpler), &CONVERGED);
+        }
         fitted.parts.retain(|p| !p.is_nothing(&self.limits));
         fitted
     }
@@ -371,12 +388,12 @@ impl Search<'_> {
     /// `current` with the one of `candidates` that explains most beside it.
     fn best(&self, current: &Fitted, candidates: Vec<Part>) -> Fitted {
         let others = expected(self.periodogram, &current.parts);
-        let mut begun: Vec<Fitted> = candidates.into_par_iter().map(|part| self.fit(&[part], &others, 3)).collect();
+        let mut begun: Vec<Fitted> = candidates.into_par_iter().map(|part| self.fit(&[part], &others, &BEGUN)).collect();
         begun.sort_by(|a, b| a.score().total_cmp(&b.score()));
         begun.truncate(CANDIDATES_FITTED);
         let noise = current.parts.iter().filter_map(Part::noise);
         let of_noise: f64 = noise.map(|factors| self.periodogram.of_factors(factors).0).sum();
-        let added: Vec<Fitted> = begun.into_par_iter().map(|begun| self.fit(&begun.parts, &others, 12)).collect();
+        let added: Vec<Fitted> = begun.into_par_iter().map(|begun| self.fit(&begun.parts, &others, &ADDED)).collect();
         match added.into_iter().min_by(|a, b| a.score().total_cmp(&b.score())) {
             Some(added) => Fitted {
                 parts: current.parts.iter().cloned().chain(added.parts).collect(),
@@ -501,13 +518,13 @@ impl Search<'_> {
     }
 
     /// The numbers of `parts` that are likeliest beside `others`.
-    fn fit(&self, parts: &[Part], others: &[f64], iterations: u64) -> Fitted {
+    fn fit(&self, parts: &[Part], others: &[f64], effort: &Effort) -> Fitted {
         let cost = Whittle { periodogram: self.periodogram, others, parts };
         let variables = parts.iter().flat_map(|p| p.variables(&self.limits)).collect();
         let values: Vec<f64> = parts.iter().flat_map(Part::values).collect();
         let fit = Problem::new(&cost, variables).ok().and_then(|problem| {
-            let optimiser = Optimiser::LevenbergMarquardt { step_tolerance: 1e-3 };
-            optimiser.minimise(&problem, &values, &Budget { iterations, ..Budget::default() }).ok()
+            let optimiser = Optimiser::LevenbergMarquardt { step_tolerance: effort.step_tolerance };
+            optimiser.minimise(&problem, &values, &Budget { iterations: effort.iterations, ..Budget::default() }).ok()
         });
         match fit {
             Some(fit) => {

@@ -195,6 +195,17 @@ impl Part {
         }
     }
 
+    /// This part with fewer numbers, where one of them has come to nothing: an oscillator whose quality is as low as it may be is
+    /// first-order noise with the corner `f₀ Q`, since `f₀` lies far above what is left of its spectrum.
+    pub(super) fn simpler(&self) -> Option<Self> {
+        match *self {
+            Self::Single(Term::Resonance { std_k, frequency_hz, quality }) if quality <= 1.001 * QUALITY_BOUNDS[0] => {
+                Some(Self::Single(Term::Rough { std_k, corner_hz: frequency_hz * quality }))
+            }
+            _ => None,
+        }
+    }
+
     /// The numbers that are fitted.
     pub(super) fn values(&self) -> Vec<f64> {
         match self {
