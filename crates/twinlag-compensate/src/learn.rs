@@ -388,7 +388,8 @@ impl Search<'_> {
     /// `current` with the one of `candidates` that explains most beside it.
     fn best(&self, current: &Fitted, candidates: Vec<Part>) -> Fitted {
         let others = expected(self.periodogram, &current.parts);
-        let mut begun: Vec<Fitted> = candidates.into_par_iter().map(|part| self.fit(&[part], &others, &BEGUN)).collect();
+        let mut begun: Vec<Fitted> =
+            candidates.into_par_iter().map(|part| self.fit(&[part], &others, &BEGUN)).collect();
         begun.sort_by(|a, b| a.score().total_cmp(&b.score()));
         begun.truncate(CANDIDATES_FITTED);
         let noise = current.parts.iter().filter_map(Part::noise);

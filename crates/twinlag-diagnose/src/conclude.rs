@@ -9,9 +9,9 @@ use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, 
 use crate::errors::Squares;
 use crate::excitation::SINGLE;
 use crate::first_state::{FirstState, FirstStateChoice, choose};
-use crate::grade::{Basis, Excess, Grade, Judgement, Reason, excess};
-use crate::if_known::{IfKnown, if_known};
-use crate::judge::{Circumstances, Judgements};
+use crate::grade::{Basis, Excess, Grade, Reason, excess};
+use crate::if_known::if_known;
+use crate::judge::Circumstances;
 use crate::left_over::what_is_left;
 use crate::limits::not_testable;
 use crate::moves::{Move, Searched, State};
@@ -114,8 +114,9 @@ pub(crate) fn conclude(
         if_known(&with_effects, last.chi2_per_dof, is_whole, &state, policy)
     };
     if !is_total_delay {
-        withhold_from_valley(&mut last, &mut judgements, if_known.as_ref());
-        withhold_from_valley(&mut base, &mut base_judgements, if_known.as_ref());
+        let is_same = |difference: &TimeConstant| if_known.as_ref().is_some_and(|table| table.holds(difference));
+        judgements.withhold_from_valley(&mut last, is_same);
+        base_judgements.withhold_from_valley(&mut base, is_same);
     }
     let unexplained = left.filter(|_| !is_whole && !is_refused);
     if unexplained.is_some() {
@@ -335,16 +336,6 @@ fn withhold_other_cases(effects: &mut [Found], is_whole: bool, is_given: bool) {
     let is_withheld = |found: &Found| !is_whole || found.judgements.iter().any(|j| j.grade == Grade::NoGo);
     for found in effects.iter_mut().filter(|found| is_withheld(found)) {
         found.first_state.iter_mut().for_each(|first| first.otherwise.clear());
-    }
-}
-
-/// Takes back a difference of time constants neither of which is determined: it is that of where the fit ended in their valley,
-/// unless it is the same for all values that the record allows, as `table` says.
-fn withhold_from_valley(fit: &mut ModelFit, judgements: &mut Judgements, table: Option<&IfKnown>) {
-    let is_neither_determined = fit.time_constants.iter().all(|t| t.value_s.is_none());
-    if is_neither_determined && !table.is_some_and(|table| table.holds(&fit.difference)) {
-        fit.difference = TimeConstant::default();
-        judgements.difference = Judgement::of(&[Reason::NotDetermined]);
     }
 }
 

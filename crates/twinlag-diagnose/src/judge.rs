@@ -16,6 +16,20 @@ pub struct Judgements {
     pub difference: Judgement,
 }
 
+impl Judgements {
+    /// Takes back a difference of time constants neither of which is determined: it is that of where the fit ended in their valley,
+    /// unless it is the same for all values that the record allows.
+    ///
+    /// - `is_same`: whether a difference is
+    pub fn withhold_from_valley(&mut self, fit: &mut ModelFit, is_same: impl FnOnce(&TimeConstant) -> bool) {
+        let is_neither_determined = fit.time_constants.iter().all(|t| t.value_s.is_none());
+        if is_neither_determined && !is_same(&fit.difference) {
+            fit.difference = TimeConstant::default();
+            self.difference = Judgement::of(&[Reason::NotDetermined]);
+        }
+    }
+}
+
 /// What the numbers of a fit are judged by.
 #[derive(Clone, Debug)]
 #[non_exhaustive]

@@ -19,6 +19,9 @@ use crate::selection::Selection;
 use crate::spectrum::Bands;
 use crate::trace::Trace;
 
+/// Standard errors by which neighbouring readings are correlated where a sensor follows a gas.
+const CORRELATED_STANDARD_ERRORS: f64 = 4.0;
+
 /// Whether a time constant is shorter than the samples resolve, or as long as the record. One that is known need not be
 /// resolved, and beside it the other may be as short as its interval allows: it is how far one sensor lags behind the other.
 pub fn is_unresolved(fitted: &Fitted, observations: &Observations, policy: &Policy) -> bool {
@@ -35,7 +38,8 @@ fn longest_resolved_s(observations: &Observations, policy: &Policy) -> f64 {
 }
 
 /// Whether half or twice a time constant fits as well, the other parameters free: then it is not determined, whatever the curvature
-/// at the minimum says, as with two equal sensors. A curvature that is certain to a few per cent is believed.
+/// at the minimum says, as with two equal sensors. A curvature that is certain to a few per cent is believed where both sensors
+/// follow a gas: that of noise alone is certain, and by chance.
 fn is_flat(
     fitted: &Fitted,
     observations: &Observations,
@@ -48,7 +52,9 @@ fn is_flat(
         return false;
     }
     let tau_s = fitted.theta[0];
-    if variance.is_some_and(|v| v.sqrt() < policy.certain_log_std * tau_s) {
+    if variance.is_some_and(|v| v.sqrt() < policy.certain_log_std * tau_s)
+        && (0..2).all(|i| is_correlated(observations, i))
+    {
         return false;
     }
     [1.0 / policy.ridge_factor, policy.ridge_factor].into_iter().any(|factor| {
@@ -60,6 +66,16 @@ fn is_flat(
         let other = model.fit(&theta, observations, selection, Effort::Finish);
         other.chi2 - fitted.chi2 < CHI2_95 * fitted.mean_energy().max(1.0)
     })
+}
+
+/// Whether each reading of a channel says something of the next one, as that of a sensor which lags does: their correlation is that of
+/// white noise, zero within `1/√n`, by chance once in 30 000.
+fn is_correlated(observations: &Observations, channel: usize) -> bool {
+    let [mean_c, std_k] = observations.mean_and_std(channel);
+    let readings = || observations.stretches.iter().map(|stretch| &stretch.reading_c[channel]);
+    let products: f64 = readings().flat_map(|y| y.windows(2).map(|pair| (pair[0] - mean_c) * (pair[1] - mean_c))).sum();
+    let pairs: usize = readings().map(|y| y.len().saturating_sub(1)).sum();
+    products > CORRELATED_STANDARD_ERRORS * (pairs as f64).sqrt() * std_k * std_k
 }
 
 /// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first

@@ -69,7 +69,8 @@ pub(crate) fn with_model(
         basis.reasons.push(Reason::SingleTone);
     }
     let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
-    let judgements = circumstances.judge(&mut known.fit);
+    let mut judgements = circumstances.judge(&mut known.fit);
+    judgements.withhold_from_valley(&mut known.fit, |_| false);
     let fitted = FittedAnswer {
         record,
         fit: &known.fit,

@@ -10,3 +10,4 @@ mod properties;
 mod second_order;
 mod several_records;
 mod stream;
+mod undetermined;

@@ -1,0 +1,44 @@
+//! What a record does not determine, no verb gives.
+
+use crate::common::record;
+use twinlag::{CompensateOptions, DiagnoseOptions, Options, TrackOptions, characterise, compensate, diagnose, track};
+
+/// The gas stands still, and neither channel has anything but noise. Failed: `track` gave both time constants of the longest one within 2 %,
+/// the curvature of the cost being that of the noise.
+#[test]
+fn nothing_is_given_of_two_channels_of_noise() {
+    let gas = "kind = \"broadband\"\nstd_k = 1e-9\ncorner_hz = 1.0";
+    let sensors = [1.0, 3.0].map(|std_k| format!("time_constant_s = 0.05\nnoise = {{ std_k = {std_k} }}"));
+    for (seed, samples) in [(1, 200), (2, 2000), (3, 8000)] {
+        let record = record(seed, samples, 0.01, gas, [&sensors[0], &sensors[1]]);
+        let answers = [
+            characterise(&record, &Options::default()).expect("a sound question"),
+            diagnose(&record, &DiagnoseOptions::default()).expect("a sound question").last,
+            track(&record, &TrackOptions::default()).expect("a sound question").last,
+            compensate(&record, &CompensateOptions::default()).expect("a sound question").last,
+        ];
+        for answer in answers {
+            assert!(answer.sensors.iter().all(|s| s.time_constant_s.is_none()), "{samples}: {:?}", answer.sensors);
+            let difference = &answer.time_constant_difference_s;
+            assert_eq!(difference.value, None, "{samples}: {difference:?} of {}", answer.estimator);
+        }
+        let along = track(&record, &TrackOptions::default()).expect("a sound question");
+        assert!(along.time_s.is_empty(), "{samples}");
+        assert!(compensate(&record, &CompensateOptions::default()).expect("a sound question").gas.is_none());
+    }
+}
+
+/// Both sensors are faster than the sampling, and the fit ends on the bound of the first, a fifth of the sampling period. The second is
+/// as much shorter than it was fitted beside that, at most: it was 3.4 ms [2.5, 5.8] and `go`. Their difference is seen.
+#[test]
+fn beside_a_sensor_that_the_sampling_does_not_show_the_other_is_as_uncertain() {
+    let gas = "kind = \"turbulence\"\nstd_k = 10.0\ncorner_hz = 0.5\ncutoff_hz = 5.0";
+    let sensors = [1e-3, 1.5e-3].map(|tau_s| format!("time_constant_s = {tau_s}\nnoise = {{ std_k = 0.05 }}"));
+    for seed in 1..=3 {
+        let record = record(seed, 2000, 0.01, gas, [&sensors[0], &sensors[1]]);
+        let answer = characterise(&record, &Options::default()).expect("a sound question");
+        assert!(answer.sensors.iter().all(|s| s.time_constant_s.is_none()), "seed {seed}: {:?}", answer.sensors);
+        let [low_s, high_s] = answer.time_constant_difference_s.interval_95_s.expect("limited");
+        assert!(low_s <= 5e-4 && 5e-4 <= high_s, "seed {seed}: {low_s} to {high_s}");
+    }
+}
