@@ -32,10 +32,10 @@ fn each_dependency_is_justified() {
     let crates = fs::read_dir(root.join("crates")).expect("a folder of the repository");
     let manifests = crates.map(|entry| entry.expect("an entry").path().join("Cargo.toml"));
     let taken: BTreeSet<String> = manifests
-        .map(|path| fs::read_to_string(path).expect("UTF-8").parse::<Table>().expect("TOML"))
+        .map(|path| fs::read_to_string(path).expect("a readable file").parse::<Table>().expect("TOML"))
         .flat_map(|manifest| taken(&manifest))
         .collect();
-    let chapter = fs::read_to_string(root.join("docs/src/dependencies.md")).expect("UTF-8");
+    let chapter = fs::read_to_string(root.join("docs/src/dependencies.md")).expect("a readable file");
     // Before the first heading stands a table of features.
     let (_, tables) = chapter.split_once("\n## ").expect("a heading for each subject");
     let (of_crates, _) = tables.split_once(REST).expect("tests and tasks have a table of their own");

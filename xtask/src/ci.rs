@@ -94,7 +94,7 @@ fn features() -> Result<()> {
     step("format of the S3 server", "cargo", &[&["fmt", "--check"], &server[..]].concat())?;
     step("without readers of binary files", "cargo", &["check", "--package", "twinlag-files", "--tests"])?;
     step(
-        "the solvers that no build leaves out",
+        "without optional solvers",
         "cargo",
         &["test", "--package", "twinlag-optimise", "--no-default-features", "--lib", "--quiet"],
     )
@@ -116,7 +116,7 @@ fn toolchains() -> Result<()> {
     } else {
         println!("== SKIPPED: in a browser; `rustup target add {}` installs what it takes", web::TARGET);
         let arguments = ["check", "--package", "twinlag", "--no-default-features"];
-        step("the facade without solvers that it does not run", "cargo", &arguments)
+        step("the facade without optional solvers", "cargo", &arguments)
     }
 }
 

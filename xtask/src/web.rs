@@ -246,7 +246,7 @@ fn packed(bytes: &[u8]) -> Result<Vec<u8>> {
     let mut options = LzmaOptions::with_preset(9);
     options.dict_size = u32::try_from(bytes.len())?;
     options.nice_len = 273; // the longest match that there is
-    // Instructions of WebAssembly begin at any byte, and one says much of the next.
+    // Instructions of WebAssembly begin at any byte (`pb`), and the byte before predicts the next (`lc`).
     options.pb = 0;
     options.lc = 4;
     let mut writer = LzmaWriter::new_use_header(Vec::new(), &options, Some(bytes.len() as u64))?;
@@ -255,7 +255,7 @@ fn packed(bytes: &[u8]) -> Result<Vec<u8>> {
 }
 
 fn gzipped(bytes: &[u8]) -> Result<Vec<u8>> {
-    // As static hosts do; level 9 of zlib-rs makes it 3 % longer, since most of it is packed already.
+    // Level 9 of zlib-rs makes longer what is packed already.
     let mut encoder = GzEncoder::new(Vec::new(), Compression::new(8));
     encoder.write_all(bytes)?;
     Ok(encoder.finish()?)

@@ -12,7 +12,7 @@ const [pagePath, records, screenshots, browserPath, program] = process.argv.slic
 // Numbers of two kinds of processor differ in their last digits.
 const RELATIVE = 1e-9;
 // Of a gas temperature, in its standard deviations: what the gas is like is searched for, and where its parts go together closely, the last
-// digits of the browser's exponentials move them by 1e-5.
+// digits of the browser's exponentials move it by up to 1e-5. Ten times that.
 const GAS_RELATIVE = 1e-4;
 const DESK = { width: 1280, height: 900, scheme: "light" };
 const PHONE = { width: 400, height: 800, scheme: "light" };
@@ -115,9 +115,13 @@ async function answers(open, where, names) {
     // The header, then the grade and what is kept of the file.
     const words = (rows) => [rows[0], ...rows.slice(1).map((row) => row.slice(3))].join("\n");
     if (words(gas) !== words(wanted)) fail(where, `gas: ${gas[0]} and ${wanted[0]}, or what is behind the numbers`);
+    if (gas.length !== wanted.length) {
+      fail(where, `the gas has ${gas.length} rows, by the program ${wanted.length}`);
+      return page.close();
+    }
     const apart = Math.max(...gas.slice(1).map((row, k) => farthest(row.slice(0, 3).map(Number), wanted[k + 1].slice(0, 3).map(Number))));
     console.log(`== ${where}: the gas within ${apart.toExponential(1)} of its standard deviation`);
-    if (!(apart <= GAS_RELATIVE)) fail(where, "the gas is another");
+    if (!(apart <= GAS_RELATIVE)) fail(where, `the gas differs by ${apart} of its standard deviation`);
   }
   await page.close();
   console.log(`== ${where}: as the program`);

@@ -2,13 +2,16 @@
 
 use std::path::Path;
 
-use twinlag::Kept;
 use twinlag::record::{ColumnRef, Record};
+use twinlag::{Keep, Kept};
 
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::read::table_watched;
+
+/// The word for all columns that are not read as time or temperature.
+const ALL: &str = "all";
 
 /// Refuses names of columns that the file does not have, before any work.
 pub(crate) fn check(
@@ -41,5 +44,7 @@ pub(crate) fn kept(
     if table.rows() != record.len() {
         return Err(Failure::File(format!("{}: it has changed while it was read", file.display())));
     }
-    Ok(Kept::of(table, &profile.selection, named, record)?)
+    let is_all = named.iter().any(|name| name.to_string() == ALL);
+    let keep = if is_all { Keep::All } else { Keep::Named(named) };
+    Ok(Kept::of(table, &profile.selection, keep, record)?)
 }

@@ -37,7 +37,7 @@ const MIN_SAMPLES: usize = 32;
 const MAX_MISSING_SHARE: f64 = 0.01;
 /// What a harmonic must gain to count as one: chance gains less, 19 times in 20.
 const MIN_HARMONIC_GAIN: f64 = 1.0;
-/// Candidates that are fitted to the end, after all were begun.
+/// Candidates that are fitted on ([`ADDED`]), after all were begun.
 const CANDIDATES_FITTED: usize = 4;
 /// Scores are twice a negative logarithm of a probability. Below this gain a part is not better than
 /// none: fits that end early leave as much.
@@ -61,10 +61,11 @@ struct Effort {
     step_tolerance: f64,
 }
 
-/// Of a candidate among many, of the few that are left of these, and of all parts together: these fits have to end where rounding
-/// does not decide, since compilers and processors round differently.
+/// Of a candidate among many.
 const BEGUN: Effort = Effort { iterations: 3, step_tolerance: 1e-3 };
+/// Of the few candidates that are left.
 const ADDED: Effort = Effort { iterations: 12, step_tolerance: 1e-3 };
+/// Of all parts together: the fit ends where rounding, which differs between compilers and processors, does not decide.
 const CONVERGED: Effort = Effort { iterations: 100, step_tolerance: 1e-9 };
 
 /// A prior for the gas, and how well the readings determine it.
@@ -194,6 +195,7 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask, from: Option<&GasParts>) ->
     // What was found in pools is fitted to all bins.
     let search = Search { periodogram: &periodogram, ..search };
     let best = search.jointly(Fitted::unknown(best.parts));
+    others.retain(|other| kinds(&other.parts) != kinds(&best.parts));
     let missing = 1.0 - got as f64 / periodogram.all as f64;
     let is_uneven = readings.unevenness() > MAX_MISSING_SHARE;
     let is_bridged = missing > MAX_MISSING_SHARE || is_uneven;
@@ -371,9 +373,13 @@ impl Search<'_> {
             return current;
         }
         let mut fitted = self.fit(&current.parts, &self.beside(&current.parts), &CONVERGED);
-        if fitted.parts.iter().any(|part| part.simpler().is_some()) {
-            let simpler: Vec<Part> = fitted.parts.into_iter().map(|part| part.simpler().unwrap_or(part)).collect();
-            fitted = self.fit(&simpler, &self.beside(&simpler), &CONVERGED);
+        let simpler: Vec<Part> =
+            fitted.parts.iter().map(|part| part.simpler().unwrap_or_else(|| part.clone())).collect();
+        if simpler != fitted.parts {
+            let other = self.fit(&simpler, &self.beside(&simpler), &CONVERGED);
+            if other.score() <= fitted.score() {
+                fitted = other;
+            }
         }
         fitted.parts.retain(|p| !p.is_nothing(&self.limits));
         fitted

@@ -17,13 +17,12 @@ pub struct Judgements {
 }
 
 impl Judgements {
-    /// Takes back a difference of time constants neither of which is determined: it is that of where the fit ended in their valley,
-    /// unless it is the same for all values that the record allows.
+    /// Takes back a difference of time constants neither of which is determined: it is that of where the fit ended in their valley.
     ///
-    /// - `is_same`: whether a difference is
-    pub fn withhold_from_valley(&mut self, fit: &mut ModelFit, is_same: impl FnOnce(&TimeConstant) -> bool) {
+    /// - `is_same_throughout`: whether the difference is the same for all time constants that the record allows
+    pub fn withhold_from_valley(&mut self, fit: &mut ModelFit, is_same_throughout: bool) {
         let is_neither_determined = fit.time_constants.iter().all(|t| t.value_s.is_none());
-        if is_neither_determined && !is_same(&fit.difference) {
+        if is_neither_determined && !is_same_throughout {
             fit.difference = TimeConstant::default();
             self.difference = Judgement::of(&[Reason::NotDetermined]);
         }

@@ -188,7 +188,15 @@ impl<const P: usize> Walk<'_, '_, P> {
             if is_last {
                 held_s = SHARE_OF_BOUND_THAT_IS_NONE * variable.lower;
             }
-            let Some(held) = self.fit_at(held_s, &last)? else { break };
+            let Some(held) = self.fit_at(held_s, &last)? else {
+                // Where the other would be below its own bound, as far as their difference goes, it may be anything down to nothing.
+                let other_s = last[self.other] - (last[self.index] - held_s);
+                let is_below = direction < 0 && other_s < self.from.variables[self.other].lower;
+                if let Some(found) = found.as_mut().filter(|_| is_below) {
+                    found.other[0] = 0.0;
+                }
+                break;
+            };
             if !held.is_allowed {
                 let edge = self.edge(last, held_s)?;
                 self.include(&edge, found);

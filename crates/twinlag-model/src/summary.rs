@@ -19,7 +19,7 @@ use crate::selection::Selection;
 use crate::spectrum::Bands;
 use crate::trace::Trace;
 
-/// Standard errors by which neighbouring readings are correlated where a sensor follows a gas.
+/// Standard errors from zero beyond which neighbouring readings count as correlated.
 const CORRELATED_STANDARD_ERRORS: f64 = 4.0;
 
 /// Whether a time constant is shorter than the samples resolve, or as long as the record. One that is known need not be
@@ -68,14 +68,22 @@ fn is_flat(
     })
 }
 
-/// Whether each reading of a channel says something of the next one, as that of a sensor which lags does: their correlation is that of
-/// white noise, zero within `1/√n`, by chance once in 30 000.
+/// Whether neighbouring readings of a channel are correlated, as those of a sensor that lags are. White noise passes once in 30 000: its
+/// correlation is normal with the standard error `1/√n`. Each stretch is taken about its own mean, without what is masked.
 fn is_correlated(observations: &Observations, channel: usize) -> bool {
-    let [mean_c, std_k] = observations.mean_and_std(channel);
-    let readings = || observations.stretches.iter().map(|stretch| &stretch.reading_c[channel]);
-    let products: f64 = readings().flat_map(|y| y.windows(2).map(|pair| (pair[0] - mean_c) * (pair[1] - mean_c))).sum();
-    let pairs: usize = readings().map(|y| y.len().saturating_sub(1)).sum();
-    products > CORRELATED_STANDARD_ERRORS * (pairs as f64).sqrt() * std_k * std_k
+    let (mut products, mut squares, mut pairs) = (0.0, 0.0, 0_usize);
+    for stretch in &observations.stretches {
+        let (y, masked) = (&stretch.reading_c[channel], &stretch.masked[channel]);
+        let kept = || y.iter().zip(masked).filter(|(_, masked)| !**masked).map(|(y, _)| *y);
+        let mean_c = kept().sum::<f64>() / kept().count().max(1) as f64;
+        for k in (1..y.len()).filter(|&k| !masked[k - 1] && !masked[k]) {
+            let [before_k, here_k] = [y[k - 1] - mean_c, y[k] - mean_c];
+            products += before_k * here_k;
+            squares += here_k * here_k;
+            pairs += 1;
+        }
+    }
+    products * (pairs as f64).sqrt() > CORRELATED_STANDARD_ERRORS * squares
 }
 
 /// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first

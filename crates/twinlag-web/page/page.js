@@ -147,8 +147,9 @@
       byId("asking").hidden = !found.every(({ inspection }) => inspection?.record);
     } catch (error) {
       if (error.isBroken) await restart();
-      if (mine === generation) byId("asking").hidden = true;
-      if (mine === generation && !error.isEnded) warn(`The files cannot be read in this page: ${error.message}.`);
+      if (mine !== generation) return;
+      byId("asking").hidden = true;
+      if (!error.isEnded) warn(`The files cannot be read in this page: ${error.message}.`);
     }
   }
 
@@ -328,9 +329,9 @@
   }
 
   async function diagnose() {
-    if (!checkPeriod() || !checkNoise()) return;
-    await reading;
-    if (isWorking || byId("asking").hidden) return;
+    // What is chosen meanwhile is read as well.
+    for (let seen; seen !== reading;) await (seen = reading);
+    if (isWorking || byId("asking").hidden || !checkPeriod() || !checkNoise()) return;
     const answer = await work("diagnose", { options: options() });
     if (!answer) return;
     showAnswer(answer);

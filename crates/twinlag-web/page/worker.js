@@ -1,7 +1,7 @@
 // The worker: one session, and one request at a time. It is ended, and begun anew, to stop a request.
 "use strict";
 let page;
-let first;                              // what was read first, and how
+let first;                              // the bytes of the first file
 
 
 function sayProgress(task, done, total) {
@@ -32,16 +32,15 @@ const answers = {
   read: ({ files, selection, group, join }) => {
     page.free();
     page = new wasm_bindgen.Page();
-    const how = ({ name, bytes }) => [name, new Uint8Array(bytes), selection, group, join];
-    const read = (file) => ({ name: file.name, inspection: JSON.parse(page.add(...how(file))) });
-    first = how(files[0]);
+    const read = ({ name, bytes }) => ({ name, inspection: JSON.parse(page.add(name, new Uint8Array(bytes), selection, group, join)) });
+    first = new Uint8Array(files[0].bytes);
     return files.map((file) => orRefusal(() => read(file), (problem) => ({ name: file.name, problem })));
   },
   diagnose: ({ options, madeAt }) => ({
     json: page.diagnose(options), report: page.report(madeAt), model: page.model(),
   }),
   compensate: ({ model, madeAt }) => ({
-    json: page.compensate(model), report: page.gasReport(madeAt), csv: page.gasCsv(...first),
+    json: page.compensate(model), report: page.gasReport(madeAt), csv: page.gasCsv(first),
   }),
 };
 

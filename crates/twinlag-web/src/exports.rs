@@ -84,15 +84,8 @@ impl Page {
 
     /// [`Session::gas_csv`].
     #[wasm_bindgen(js_name = gasCsv)]
-    pub fn gas_csv(
-        &self,
-        name: &str,
-        bytes: Vec<u8>,
-        selection: &str,
-        group: Option<String>,
-        join: bool,
-    ) -> Result<Option<String>, JsError> {
-        self.session.gas_csv(name, bytes, selection, group, join).map_err(thrown)
+    pub fn gas_csv(&self, bytes: Vec<u8>) -> Result<Option<String>, JsError> {
+        self.session.gas_csv(bytes).map_err(thrown)
     }
 
     /// [`Session::model`].

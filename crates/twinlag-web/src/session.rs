@@ -6,7 +6,7 @@ use thiserror::Error;
 use twinlag::record::{Decimals, Record, RecordError, Selection, Table, write_csv};
 use twinlag::signal::{Rig, SignalError};
 use twinlag::{
-    CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Inspection, Kept, Options, Status, Watch,
+    CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Inspection, Keep, Kept, Options, Status, Watch,
     compensate_watched, diagnose_records_watched, diagnose_watched, inspect, joined,
 };
 use twinlag_files::{Choice, FileError, are_binary, contents_of_bytes, read_bytes};
@@ -49,6 +49,9 @@ pub enum SessionError {
 #[derive(Debug)]
 struct Added {
     record: Record,
+    /// How it was read.
+    selection: Selection,
+    choice: Choice,
     /// SHA-256 of the file, in hexadecimal digits.
     sha256: String,
 }
@@ -112,7 +115,7 @@ impl Session {
         let (inspection, record) = inspect(table(name, bytes, &choice)?, &selection);
         (self.diagnosis, self.gas) = (None, None);
         if let Ok(record) = record {
-            self.added.push(Added { record, sha256 });
+            self.added.push(Added { record, selection, choice, sha256 });
         }
         Ok(serde_json::to_string::<Inspection>(&inspection)?)
     }
@@ -178,28 +181,21 @@ impl Session {
         Ok(gas_report(&first[0].record, gas, &making(first, made_at))?)
     }
 
-    /// The gas temperature as CSV, as `twinlag compensate` writes it, with the dates and times of the first file, which is given once
-    /// more; `None` where there is none to give.
+    /// The gas temperature as CSV, as `twinlag compensate` writes it, with the dates and times of the file of the first record; `None`
+    /// where there is none to give.
     ///
-    /// - `name`, `selection`, `group`, `join`: as of [`Session::add`]
+    /// - `bytes`: that file, once more
     ///
     /// # Errors
-    /// [`SessionError::Order`] before [`Session::compensate`]; those of [`Session::add`].
-    pub fn gas_csv(
-        &self,
-        name: &str,
-        bytes: Vec<u8>,
-        selection: &str,
-        group: Option<String>,
-        join: bool,
-    ) -> Result<Option<String>, SessionError> {
+    /// [`SessionError::Order`] before [`Session::compensate`]; [`SessionError::Verb`] of a file with other rows than the record, and
+    /// those of [`Session::add`].
+    pub fn gas_csv(&self, bytes: Vec<u8>) -> Result<Option<String>, SessionError> {
         let gas = self.gas()?;
         if gas.status != Status::Ok {
             return Ok(None);
         }
-        let selection: Selection = parsed(selection)?;
-        let choice = Choice { group, join, ..Choice::of(&selection) };
-        let kept = Kept::of(table(name, bytes, &choice)?, &selection, &[], &self.added[0].record)?;
+        let Added { record, selection, choice, .. } = &self.added[0];
+        let kept = Kept::of(table(&record.source, bytes, choice)?, selection, Keep::Stamps, record)?;
         let mut text = Vec::new();
         gas.write_csv(&mut text, kept.as_ref())?;
         Ok(Some(String::from_utf8_lossy(&text).into_owned()))

@@ -47,7 +47,7 @@ fn a_session_diagnoses_as_the_library_does() {
     assert_eq!(model, serde_json::to_string_pretty(&wanted.model()).expect("JSON"));
 
     session.compensate(&model, &unwatched).expect("an answer");
-    let csv = session.gas_csv("run.csv", example(ROWS), "{}", None, false);
+    let csv = session.gas_csv(example(ROWS));
     let csv = csv.expect("in order").expect("a gas temperature");
     let options = CompensateOptions { model: Some(wanted.model()), ..CompensateOptions::default() };
     let gas = compensate(&record, &options).expect("an answer");
@@ -102,11 +102,11 @@ fn what_comes_before_something_else_is_named() {
     let refused = |error: SessionError| error.to_string();
     assert_eq!(session.diagnose("{}", &unwatched).map_err(refused), Err("expected a record before this".to_owned()));
     assert_eq!(session.report("").map_err(refused), Err("expected a diagnosis before this".to_owned()));
-    let csv = session.gas_csv("run.csv", short(), "{}", None, false);
+    let csv = session.gas_csv(short());
     assert_eq!(csv.map_err(refused), Err("expected a gas temperature before this".to_owned()));
 }
 
-/// Where rows of the file are not those of the record, nothing is put beside it.
+/// A file with other rows than the record is refused.
 #[test]
 fn stamps_of_the_file_stand_beside_its_gas_temperature() {
     const ROWS: usize = 2500;
@@ -122,12 +122,12 @@ fn stamps_of_the_file_stand_beside_its_gas_temperature() {
     session.diagnose("{}", &unwatched).expect("an answer");
     let model = session.model().expect("a model");
     session.compensate(&model, &unwatched).expect("an answer");
-    let csv = session.gas_csv("run.csv", file.clone(), "{}", None, false);
+    let csv = session.gas_csv(file.clone());
     let csv = csv.expect("in order").expect("a gas temperature");
     assert_eq!(csv.lines().next(), Some("time_s,gas_C,gas_std_K,grade,when"));
     assert!(csv.lines().nth(101).is_some_and(|row| row.ends_with(",2026-05-01 10:00:00.200")));
     let shorter = file[..file.len() / 2].to_vec();
-    assert!(session.gas_csv("run.csv", shorter, "{}", None, false).is_err_and(|e| e.to_string().contains("2500")));
+    assert!(session.gas_csv(shorter).is_err_and(|e| e.to_string().contains("2500")));
 }
 
 #[test]

@@ -155,10 +155,10 @@ impl<'a> Reconstruction<'a> {
         self.stop.check()?;
         let (_, nominal) = self.rig(theta, [1.0; 2])?;
         let known = self.options.model.as_ref().and_then(|model| model.gas.as_ref());
-        let learned = match known {
-            _ if is_found => learn_with_noise(readings, &nominal, known)?,
-            Some(known) => learn_from(readings, &nominal, known)?,
-            None => learn(readings, &nominal)?,
+        let learned = match (is_found, known) {
+            (true, _) => learn_with_noise(readings, &nominal, known)?,
+            (false, Some(known)) => learn_from(readings, &nominal, known)?,
+            (false, None) => learn(readings, &nominal)?,
         };
         let pieces = self.in_pieces()?;
         let part = pieces.as_ref().unwrap_or(self);

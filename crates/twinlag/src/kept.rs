@@ -7,19 +7,27 @@ use twinlag_record::{ColumnRef, Kind, Record, RecordError, Selection, Table, Tex
 use crate::error::Error;
 use crate::rows::rows_of_samples;
 
-/// The word for all columns that are not read as time or temperature.
-const ALL: &str = "all";
+/// Which columns of a table are kept.
+#[derive(Clone, Copy, Debug)]
+pub enum Keep<'a> {
+    /// Dates and times of day.
+    Stamps,
+    /// These, and dates and times of day.
+    Named(&'a [ColumnRef]),
+    /// Every column but those of time and of both sensors, and dates and times of day.
+    All,
+}
 
 /// Columns of the table of a record, by the samples of an answer: its dates and times of day, and others that are asked for.
 ///
 /// ```
-/// use twinlag::Kept;
+/// use twinlag::{Keep, Kept};
 /// use twinlag::record::{Record, Selection, Table};
 ///
 /// let text: String = (0..60).map(|k| format!("2026-05-01 10:00:{k:02},2{}.5,2{}.1,run {k}\n", k % 7, k % 5)).collect();
 /// let table = || Table::parse(&format!("when,T1 (C),T2 (C),note\n{text}"), "run.csv");
 /// let record = Record::from_table(table()?, &Selection::default())?;
-/// let kept = Kept::of(table()?, &Selection::default(), &["note".parse()?], &record)?.expect("there are stamps");
+/// let kept = Kept::of(table()?, &Selection::default(), Keep::Named(&["note".parse()?]), &record)?.expect("there are stamps");
 /// let columns = kept.columns(60);
 /// assert_eq!((columns[0].0, (columns[0].1)(7)), ("when", "2026-05-01 10:00:07".to_owned()));
 /// assert_eq!((columns[1].0, (columns[1].1)(7)), ("note", "run 7".to_owned()));
@@ -36,16 +44,9 @@ pub struct Kept {
 impl Kept {
     /// Keeps columns of `table`, which `record` is of; `None` where there is nothing to keep.
     ///
-    /// - `named`: the columns to keep beside dates and times, or `all` for every one that `selection` does not read
-    ///
     /// # Errors
     /// [`Error::Record`] of columns that the table does not have, and of a table with other rows than the record.
-    pub fn of(
-        table: Table,
-        selection: &Selection,
-        named: &[ColumnRef],
-        record: &Record,
-    ) -> Result<Option<Self>, Error> {
+    pub fn of(table: Table, selection: &Selection, keep: Keep<'_>, record: &Record) -> Result<Option<Self>, Error> {
         if table.rows() != record.len() {
             return Err(Error::Record(RecordError::LengthMismatch {
                 file: table.source().to_owned(),
@@ -58,13 +59,16 @@ impl Kept {
         let selection = table.resolved(selection)?;
         let is_stamp = |index: &usize| table.columns()[*index].kind() == Kind::Stamp;
         let mut columns: Vec<usize> = (0..table.columns().len()).filter(is_stamp).collect();
-        for name in named {
-            if name.to_string() == ALL {
+        match keep {
+            Keep::Stamps => {}
+            Keep::Named(names) => {
+                let named: Vec<usize> = names.iter().map(|name| table.find(name)).collect::<Result<_, _>>()?;
+                columns.extend(named);
+            }
+            Keep::All => {
                 let read = [&selection.time, &selection.t1, &selection.t2].into_iter().flatten();
                 let read: Vec<usize> = read.map(|column| table.find(column)).collect::<Result<_, _>>()?;
                 columns.extend((0..table.columns().len()).filter(|index| !read.contains(index)));
-            } else {
-                columns.push(table.find(name)?);
             }
         }
         let mut seen = HashSet::new();
@@ -72,8 +76,8 @@ impl Kept {
         Ok((!columns.is_empty()).then(|| Self { columns, rows: rows_of_samples(record), table }))
     }
 
-    /// The columns for an output of so many samples. A cell is empty of a sample that is missing in the table, and all are where
-    /// the answer has other instants than the record.
+    /// The columns for an answer of so many samples. Cells are empty where the table lacks the sample; all are empty if the answer has
+    /// other instants than the record, as their number tells.
     pub fn columns(&self, samples: usize) -> Vec<TextColumn<'_>> {
         let row_of =
             move |sample: usize| self.rows.get(sample).copied().flatten().filter(|_| samples == self.rows.len());

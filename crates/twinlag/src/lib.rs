@@ -94,7 +94,7 @@ pub use answers::{
     RecordNumber, RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track, TransferAnswer, TransferError,
 };
 pub use error::Error;
-pub use kept::Kept;
+pub use kept::{Keep, Kept};
 pub use options::Options;
 pub use plausibility::{Plausibility, TypicalSensor};
 pub use reference::AgainstReference;

@@ -6,7 +6,7 @@ use super::part::Part;
 use crate::error::CompensateError;
 
 /// The parts in which a gas was learned: those of the likeliest prior first, and then others that were nearly as likely. Of
-/// [`crate::Learned`], for [`crate::learn_from`].
+/// [`crate::Learned`], for [`crate::learn_from`] and [`crate::learn_with_noise`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(try_from = "Vec<Vec<Part>>", into = "Vec<Vec<Part>>")]

@@ -11,6 +11,8 @@ pub(super) type Direction = (usize, [f64; 3]);
 
 /// Bounds of a quality.
 const QUALITY_BOUNDS: [f64; 2] = [0.02, 1e4];
+/// How far above its lower bound a quality counts as on it: fits end within less.
+const ON_BOUND_SHARE: f64 = 1e-3;
 /// Lowest frequency, in units of `1/T`: a fiftieth of a cycle in the record is a drift.
 const MIN_CYCLES_PER_SPAN: f64 = 0.02;
 /// Highest frequency, in units of `1/Ts`: what is sampled.
@@ -195,11 +197,14 @@ impl Part {
         }
     }
 
-    /// This part with fewer numbers, where one of them has come to nothing: an oscillator whose quality is as low as it may be is
-    /// first-order noise with the corner `f₀ Q`, since `f₀` lies far above what is left of its spectrum.
+    /// This part with fewer numbers, where one of them says nothing: an oscillator whose quality is on its lower bound has corners at
+    /// `f₀ Q` and `f₀/Q`, a factor of 2500 apart, and with the first alone it is first-order noise. The likelihood decides whether
+    /// the second is missed.
     pub(super) fn simpler(&self) -> Option<Self> {
         match *self {
-            Self::Single(Term::Resonance { std_k, frequency_hz, quality }) if quality <= 1.001 * QUALITY_BOUNDS[0] => {
+            Self::Single(Term::Resonance { std_k, frequency_hz, quality })
+                if quality <= (1.0 + ON_BOUND_SHARE) * QUALITY_BOUNDS[0] =>
+            {
                 Some(Self::Single(Term::Rough { std_k, corner_hz: frequency_hz * quality }))
             }
             _ => None,
@@ -290,4 +295,23 @@ pub(super) fn with(like: &[Part], x: &[f64]) -> Vec<Part> {
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Below the second corner, `f₀/Q`, both spectra agree within `(f Q/f₀)²`, and at rest within `Q²`.
+    #[test]
+    fn an_oscillator_without_quality_is_first_order_noise() {
+        let resonance = Term::Resonance { std_k: 3.0, frequency_hz: 40.0, quality: QUALITY_BOUNDS[0] };
+        let Some(Part::Single(rough)) = Part::Single(resonance).simpler() else { panic!("it is simpler") };
+        for hz in [0.01, 0.1, 1.0, 10.0, 100.0] {
+            let off = resonance.density_k2_per_hz(hz) / rough.density_k2_per_hz(hz) - 1.0;
+            let allowed = 2.0 * ((hz * QUALITY_BOUNDS[0] / 40.0).powi(2) + QUALITY_BOUNDS[0].powi(2));
+            assert!(off.abs() < allowed, "{hz} Hz: {off}, {allowed} allowed");
+        }
+        let sharp = Term::Resonance { std_k: 3.0, frequency_hz: 40.0, quality: 0.03 };
+        assert_eq!(Part::Single(sharp).simpler(), None);
+    }
 }

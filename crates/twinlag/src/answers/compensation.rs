@@ -122,7 +122,7 @@ impl Compensation {
     /// table.
     ///
     /// # Errors
-    /// [`RecordError::CannotWrite`].
+    /// [`RecordError::LengthMismatch`] of an answer whose series differ in length; [`RecordError::CannotWrite`].
     pub fn write_csv(&self, out: &mut impl Write, kept: Option<&Kept>) -> Result<(), RecordError> {
         let columns: [(&str, &[f64]); 3] =
             [("time_s", &self.time_s), ("gas_C", &self.gas_c), ("gas_std_K", &self.gas_std_k)];

@@ -81,7 +81,7 @@ impl Track {
     /// `tau1_high_s`, the same of `tau2`, `grade`, and what is kept of the record's table.
     ///
     /// # Errors
-    /// [`RecordError::CannotWrite`].
+    /// [`RecordError::LengthMismatch`] of an answer whose series differ in length; [`RecordError::CannotWrite`].
     pub fn write_csv(&self, out: &mut impl Write, kept: Option<&Kept>) -> Result<(), RecordError> {
         let [one, two] = &self.sensors;
         let columns: [(&str, &[f64]); 7] = [
@@ -93,7 +93,8 @@ impl Track {
             ("tau2_low_s", &two.low_s),
             ("tau2_high_s", &two.high_s),
         ];
-        let grade: TextColumn<'_> = ("grade", Box::new(|sample| self.grades[sample].to_string()));
+        let grade: TextColumn<'_> =
+            ("grade", Box::new(|sample| self.grades.get(sample).map_or(String::new(), ToString::to_string)));
         let kept = kept.map(|kept| kept.columns(self.time_s.len())).unwrap_or_default();
         let text: Vec<TextColumn<'_>> = std::iter::once(grade).chain(kept).collect();
         write_csv_with_text(out, &columns, &text, Decimals::Shortest)

@@ -125,7 +125,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
     let narrow = found.fit.time_constants;
     let mut judgements = circumstances.judge(&mut found.fit);
-    judgements.withhold_from_valley(&mut found.fit, |_| false);
+    judgements.withhold_from_valley(&mut found.fit, false);
     let widened_by = widening(&narrow, &found.fit.time_constants);
     let bands = found.log_error.take().map(|log_error| {
         let [one, two] = std::mem::take(&mut found.tau_s);

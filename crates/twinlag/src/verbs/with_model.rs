@@ -70,7 +70,7 @@ pub(crate) fn with_model(
     }
     let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
     let mut judgements = circumstances.judge(&mut known.fit);
-    judgements.withhold_from_valley(&mut known.fit, |_| false);
+    judgements.withhold_from_valley(&mut known.fit, false);
     let fitted = FittedAnswer {
         record,
         fit: &known.fit,

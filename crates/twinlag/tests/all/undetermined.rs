@@ -28,8 +28,8 @@ fn nothing_is_given_of_two_channels_of_noise() {
     }
 }
 
-/// Both sensors are faster than the sampling, and the fit ends on the bound of the first, a fifth of the sampling period. The second is
-/// as much shorter than it was fitted beside that, at most: it was 3.4 ms [2.5, 5.8] and `go`. Their difference is seen.
+/// Both sensors are faster than the sampling, and the fit ends on the bound of the first, a fifth of the sampling period. If that
+/// were shorter the second would fall below its bound: it was 3.4 ms [2.5, 5.8] and `go`. Their difference is seen.
 #[test]
 fn beside_a_sensor_that_the_sampling_does_not_show_the_other_is_as_uncertain() {
     let gas = "kind = \"turbulence\"\nstd_k = 10.0\ncorner_hz = 0.5\ncutoff_hz = 5.0";

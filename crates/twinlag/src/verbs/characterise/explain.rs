@@ -67,13 +67,12 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         }
         let other = 1 - index;
         let [low, high] = ridge.other;
-        let low = low - self.lower_bound_s(index);
         // With a residual that is noise, a time constant that stays put whatever the other does is
         // determined all the same.
         if !self.judged.is_rejected && is_free(other) && low > 0.0 && !spans_too_much([low, high]) {
             let sensor = &mut out.sensors[other];
             sensor.time_constant_s = Some(self.best.x[other]);
-            sensor.interval_95_s = Some([low, high]);
+            sensor.interval_95_s = Some(ridge.other);
             out.not_identifiable.retain(|name| name != Known::NAMES[other]);
         } else {
             let what = if value.is_some() { "it determines their difference" } else { "it limits their difference" };
@@ -82,14 +81,6 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                  allows"
             ));
         }
-    }
-
-    /// The lower bound of time constant `i` where the fit ended on it, 0 elsewhere: below it no value was tried, and as much as is
-    /// missing there may be missing of the other one, since their difference is what is seen.
-    fn lower_bound_s(&self, i: usize) -> f64 {
-        let lower_s = self.fit.variables()[i].lower;
-        let is_on_bound = matches!(&self.best.end, End::OnBound(which) if which.contains(&i));
-        if is_on_bound && self.best.x[i] < 2.0 * lower_s { lower_s } else { 0.0 }
     }
 
     /// Why the fit is no estimate, as far as its end says.
