@@ -1,7 +1,7 @@
 //! From the last state of the loop to the answer.
 
 use twinlag_cross_relation::TestName;
-use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, TimeConstant, summarise};
+use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, summarise};
 
 use crate::candidates::{Candidate, effects_on_bounds};
 use crate::contradiction::Contradiction;

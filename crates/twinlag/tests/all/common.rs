@@ -33,6 +33,18 @@ pub(crate) fn read(rig: &Rig) -> Record {
     Record::from_channels(channels, SamplingChoice::Auto).expect("a sound record")
 }
 
+/// The channels of a record, to be changed.
+pub(crate) fn channels(record: &Record) -> Channels {
+    Channels {
+        source: record.source.clone(),
+        names: record.channels.clone(),
+        time_s: record.time_s.clone(),
+        t1_c: record.t1_c.to_vec(),
+        t2_c: record.t2_c.to_vec(),
+        reference_c: None,
+    }
+}
+
 /// Asserts that both time constants are within `errors` of their standard errors of `truth_s`.
 pub(crate) fn recovers(answer: &Characterisation, truth_s: [f64; 2], errors: f64) {
     for (sensor, truth_s) in answer.sensors.iter().zip(truth_s) {

@@ -3,7 +3,7 @@
 //! Fits end where a step would move no parameter by a thousandth of its error; two of them differ by a twentieth of a standard error at
 //! most, with room for the levels of noise, which are found anew.
 
-use crate::common::record;
+use crate::common::{channels, record};
 use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag::{CompensateOptions, DiagnoseOptions, Diagnosis, compensate, diagnose, diagnose_records};
@@ -22,17 +22,6 @@ fn records() -> [(Record, &'static [Identifier]); 2] {
         (record(11, SAMPLES, PERIOD_S, GAS, [first, second]), &[]),
         (record(12, SAMPLES, PERIOD_S, GAS, [first, &more]), &[Identifier::SECOND_ORDER]),
     ]
-}
-
-fn channels(record: &Record) -> Channels {
-    Channels {
-        source: record.source.clone(),
-        names: record.channels.clone(),
-        time_s: record.time_s.clone(),
-        t1_c: record.t1_c.to_vec(),
-        t2_c: record.t2_c.to_vec(),
-        reference_c: None,
-    }
 }
 
 fn made(channels: Channels) -> Record {
