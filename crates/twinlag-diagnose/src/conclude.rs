@@ -114,10 +114,9 @@ pub(crate) fn conclude(
         if_known(&with_effects, last.chi2_per_dof, is_whole, &state, policy)
     };
     if !is_total_delay {
-        let holds = |fit: &ModelFit| if_known.as_ref().is_some_and(|table| table.holds(&fit.difference));
-        let [of_last, of_base] = [holds(&last), holds(&base)];
-        judgements.withhold_from_valley(&mut last, of_last);
-        base_judgements.withhold_from_valley(&mut base, of_base);
+        let is_same = [&last, &base].map(|fit| if_known.as_ref().is_some_and(|table| table.holds(&fit.difference)));
+        judgements.withhold_from_valley(&mut last, is_same[0]);
+        base_judgements.withhold_from_valley(&mut base, is_same[1]);
     }
     let unexplained = left.filter(|_| !is_whole && !is_refused);
     if unexplained.is_some() {

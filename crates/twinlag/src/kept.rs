@@ -77,7 +77,7 @@ impl Kept {
     }
 
     /// The columns for an answer of so many samples. Cells are empty where the table lacks the sample; all are empty if the answer has
-    /// other instants than the record, as their number tells.
+    /// other instants than the record, as their number shows.
     pub fn columns(&self, samples: usize) -> Vec<TextColumn<'_>> {
         let row_of =
             move |sample: usize| self.rows.get(sample).copied().flatten().filter(|_| samples == self.rows.len());
