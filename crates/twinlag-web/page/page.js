@@ -387,7 +387,8 @@
     readFiles();
   });
   byId("time-unit").addEventListener("change", ({ target }) => choose("time_unit", target.value || undefined));
-  for (const id of knownInputs) byId(id).addEventListener("input", forgetAnswer);
+  // At once, and not when the field is left for the button, which would move from under the pointer.
+  for (const id of [...knownInputs, "period"]) byId(id).addEventListener("input", forgetAnswer);
   byId("period").addEventListener("change", () => {
     if (checkPeriod()) choose("period_s", Number(decimal("period")) || undefined);
   });
