@@ -25,8 +25,8 @@ pub enum Keep<'a> {
 /// use twinlag::record::{Record, Selection, Table};
 ///
 /// let text: String = (0..60).map(|k| format!("2026-05-01 10:00:{k:02},2{}.5,2{}.1,run {k}\n", k % 7, k % 5)).collect();
-/// let table = || Table::parse(&format!("when,T1 (C),T2 (C),note\n{text}"), "run.csv");
-/// let record = Record::from_table(table()?, &Selection::default())?;
+/// let table = || Table::read(format!("when,T1 (C),T2 (C),note\n{text}").as_bytes(), "run.csv");
+/// let record = Record::from_table(&table()?, &Selection::default())?;
 /// let kept = Kept::of(table()?, &Selection::default(), Keep::Named(&["note".parse()?]), &record)?.expect("there are stamps");
 /// let columns = kept.columns(60);
 /// assert_eq!((columns[0].0, (columns[0].1)(7)), ("when", "2026-05-01 10:00:07".to_owned()));
