@@ -259,3 +259,59 @@ fn time_constant(value_s: f64, variance: Option<f64>, policy: &Policy) -> TimeCo
 fn standard_error(variance: Option<f64>) -> Option<f64> {
     variance.filter(|v| v.is_finite() && *v > 0.0).map(f64::sqrt)
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+    use twinlag_signal::Rig;
+
+    use super::*;
+    use crate::observations::Stretch;
+
+    const SAMPLES: usize = 4000;
+    const PERIOD_S: f64 = 0.01;
+
+    /// Two sensors of 50 ms in a gas that moves so much, with noise of 1 K.
+    fn readings(gas_std_k: f64) -> [Vec<f64>; 2] {
+        let sensor = |channel| json!({"channel": channel, "time_constant_s": 0.05, "noise": {"std_k": 1.0}});
+        let rig: Rig = serde_json::from_value(json!({
+            "seed": 1,
+            "record": {"samples": SAMPLES, "sample_period_s": PERIOD_S},
+            "gas": {"kind": "broadband", "mean_c": 300.0, "std_k": gas_std_k, "corner_hz": 1.0},
+            "sensors": [sensor("T1"), sensor("T2")],
+        }))
+        .expect("a rig");
+        let simulated = rig.simulate().expect("a sound rig");
+        [simulated.t1_c, simulated.t2_c]
+    }
+
+    fn stretch(reading_c: [Vec<f64>; 2]) -> Stretch {
+        Stretch::new((0..reading_c[0].len()).map(|k| PERIOD_S * k as f64).collect(), reading_c)
+    }
+
+    fn are_correlated(stretches: Vec<Stretch>) -> [bool; 2] {
+        let observations = Observations::new(stretches, Some(PERIOD_S)).expect("a record");
+        [0, 1].map(|channel| is_correlated(&observations, channel))
+    }
+
+    /// A gas that moves as much as the noise correlates neighbours by about a half. Noise is not correlated; nor is it by the lines that
+    /// stand for what is masked, nor by another level in another stretch, each of which would give products of neighbours.
+    #[test]
+    fn noise_alone_is_not_correlated() {
+        assert_eq!(are_correlated(vec![stretch(readings(1.0))]), [true; 2]);
+        let noise = readings(1e-9);
+        assert_eq!(are_correlated(vec![stretch(noise.clone())]), [false; 2]);
+        let is_masked = |k: usize| k % 10 == 5;
+        let bridged = |y: &Vec<f64>| -> Vec<f64> {
+            (0..y.len()).map(|k| if is_masked(k) { 0.5 * (y[k - 1] + y[k + 1]) } else { y[k] }).collect()
+        };
+        let masked = [0, 1].map(|_| (0..SAMPLES).map(is_masked).collect());
+        let bridged = stretch([bridged(&noise[0]), bridged(&noise[1])]);
+        assert_eq!(are_correlated(vec![bridged.clone()]), [true; 2], "unmasked, lines are taken for readings");
+        assert_eq!(are_correlated(vec![bridged.with_missing(masked)]), [false; 2]);
+        let hotter = noise.clone().map(|y| y.iter().map(|c| c + 20.0).collect());
+        let mut later = stretch(hotter);
+        later.time_s = (0..SAMPLES).map(|k| 100.0 + PERIOD_S * k as f64).collect::<Vec<f64>>().into();
+        assert_eq!(are_correlated(vec![stretch(noise), later]), [false; 2]);
+    }
+}

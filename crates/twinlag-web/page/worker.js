@@ -1,8 +1,7 @@
 // The worker: one session, and one request at a time. It is ended, and begun anew, to stop a request.
 "use strict";
 let page;
-let first;                              // the bytes of the first file
-
+let first; // the bytes of the first file
 
 function sayProgress(task, done, total) {
   self.postMessage({ progress: { task, done, total } });

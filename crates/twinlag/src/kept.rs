@@ -1,8 +1,11 @@
 //! Columns of a table that go to an output as they are.
 
 use std::collections::HashSet;
+use std::io::Write;
 
-use twinlag_record::{ColumnRef, Kind, Record, RecordError, Selection, Table, TextColumn};
+use twinlag_record::{
+    ColumnRef, Decimals, Kind, Record, RecordError, Selection, Table, TextColumn, write_csv_with_text,
+};
 
 use crate::error::Error;
 use crate::rows::rows_of_samples;
@@ -90,4 +93,18 @@ impl Kept {
         };
         self.columns.iter().map(named).collect()
     }
+}
+
+/// Writes numbers as comma-separated text, behind them the grade of each sample and what is kept of the record's table.
+pub(crate) fn write_graded(
+    out: &mut impl Write,
+    numbers: &[(&str, &[f64])],
+    grade: impl Fn(usize) -> String,
+    kept: Option<&Kept>,
+) -> Result<(), RecordError> {
+    let samples = numbers.first().map_or(0, |column| column.1.len());
+    let grade: TextColumn<'_> = ("grade", Box::new(grade));
+    let kept = kept.map(|kept| kept.columns(samples)).unwrap_or_default();
+    let text: Vec<TextColumn<'_>> = std::iter::once(grade).chain(kept).collect();
+    write_csv_with_text(out, numbers, &text, Decimals::Shortest)
 }

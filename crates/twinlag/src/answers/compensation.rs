@@ -5,12 +5,12 @@ use std::io::Write;
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{Form, Prior, Rig};
 use twinlag_diagnose::{Judgement, Verdict};
-use twinlag_record::{Decimals, Record, RecordError, TextColumn, write_csv_with_text};
+use twinlag_record::{Record, RecordError};
 
 use crate::answers::diagnosis::explained;
 use crate::answers::{Characterisation, FoundIn, Model, NamedEffect, Status};
 use crate::bands::GasFault;
-use crate::kept::Kept;
+use crate::kept::{Kept, write_graded};
 use crate::reference::AgainstReference;
 
 /// How good a gas temperature is.
@@ -126,9 +126,6 @@ impl Compensation {
     pub fn write_csv(&self, out: &mut impl Write, kept: Option<&Kept>) -> Result<(), RecordError> {
         let columns: [(&str, &[f64]); 3] =
             [("time_s", &self.time_s), ("gas_C", &self.gas_c), ("gas_std_K", &self.gas_std_k)];
-        let grade: TextColumn<'_> = ("grade", Box::new(|_| self.judgement.grade.to_string()));
-        let kept = kept.map(|kept| kept.columns(self.time_s.len())).unwrap_or_default();
-        let text: Vec<TextColumn<'_>> = std::iter::once(grade).chain(kept).collect();
-        write_csv_with_text(out, &columns, &text, Decimals::Shortest)
+        write_graded(out, &columns, |_| self.judgement.grade.to_string(), kept)
     }
 }

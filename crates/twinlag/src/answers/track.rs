@@ -4,10 +4,10 @@ use std::io::Write;
 
 use serde::{Deserialize, Serialize};
 use twinlag_diagnose::{ChangePoint, Grade, Judgement, RatioTest};
-use twinlag_record::{Decimals, RecordError, TextColumn, write_csv_with_text};
+use twinlag_record::RecordError;
 
 use crate::answers::{Characterisation, Status};
-use crate::kept::Kept;
+use crate::kept::{Kept, write_graded};
 
 /// One sensor's time constant along the record.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -93,10 +93,7 @@ impl Track {
             ("tau2_low_s", &two.low_s),
             ("tau2_high_s", &two.high_s),
         ];
-        let grade: TextColumn<'_> =
-            ("grade", Box::new(|sample| self.grades.get(sample).map_or(String::new(), ToString::to_string)));
-        let kept = kept.map(|kept| kept.columns(self.time_s.len())).unwrap_or_default();
-        let text: Vec<TextColumn<'_>> = std::iter::once(grade).chain(kept).collect();
-        write_csv_with_text(out, &columns, &text, Decimals::Shortest)
+        let grade = |sample: usize| self.grades.get(sample).map_or(String::new(), ToString::to_string);
+        write_graded(out, &columns, grade, kept)
     }
 }
