@@ -26,7 +26,9 @@ use twinlag_files::{Choice, are_binary, contents_of_bytes, read_bytes};
 /// Rows that a verb is given, at most.
 const MAX_ROWS: usize = 200;
 /// Integration steps of a rig that is simulated, at most: what a rig may ask for is a question of patience.
-const MAX_STEPS: usize = 100_000;
+const MAX_STEPS: f64 = 1e5;
+/// Samples of the records of a plan, at most: reading it simulates its gases.
+const MAX_PLANNED_SAMPLES: i64 = 20_000;
 /// Whole numbers are readings in hundredths of a kelvin.
 const READING_STEP_K: f64 = 0.01;
 const PERIOD_S: f64 = 0.01;
@@ -55,7 +57,7 @@ pub fn binary(bytes: &[u8]) {
 /// The description of a rig, as TOML, and a record of it.
 pub fn rig(bytes: &[u8]) {
     let Some(rig) = str::from_utf8(bytes).ok().and_then(|text| toml::from_str::<Rig>(text).ok()) else { return };
-    if rig.record().samples.saturating_mul(rig.record().oversampling) > MAX_STEPS {
+    if rig.steps() > MAX_STEPS {
         return;
     }
     if let Ok(simulated) = rig.simulate() {
@@ -66,7 +68,26 @@ pub fn rig(bytes: &[u8]) {
 
 /// The plan of a study, as TOML.
 pub fn plan(bytes: &[u8]) {
-    let _ = str::from_utf8(bytes).map(Plan::from_toml);
+    let Ok(text) = str::from_utf8(bytes) else { return };
+    let is_long = text.parse::<toml::Table>().is_ok_and(|table| asks_for_much(&toml::Value::Table(table)));
+    if !is_long {
+        let _ = Plan::from_toml(text);
+    }
+}
+
+/// Whether a plan asks for long records anywhere.
+fn asks_for_much(value: &toml::Value) -> bool {
+    let exceeds = |value: &toml::Value| match value {
+        toml::Value::Array(all) => all.iter().any(|one| one.as_integer().is_some_and(|n| n > MAX_PLANNED_SAMPLES)),
+        one => one.as_integer().is_some_and(|n| n > MAX_PLANNED_SAMPLES),
+    };
+    match value {
+        toml::Value::Table(table) => {
+            table.iter().any(|(key, value)| (key == "samples" && exceeds(value)) || asks_for_much(value))
+        }
+        toml::Value::Array(all) => all.iter().any(asks_for_much),
+        _ => false,
+    }
 }
 
 /// A profile: what is said of the columns of a file, as TOML and as JSON.

@@ -31,6 +31,7 @@ fn text() {
 
 #[test]
 fn binary() {
+    replay("corpus/binary", twinlag_fuzz::binary);
     replay(FIXTURES, twinlag_fuzz::binary);
 }
 

@@ -65,7 +65,9 @@ struct Effort {
 const BEGUN: Effort = Effort { iterations: 3, step_tolerance: 1e-3 };
 /// Of the few candidates that are left.
 const ADDED: Effort = Effort { iterations: 12, step_tolerance: 1e-3 };
-/// Of all parts together: the fit ends where rounding, which differs between compilers and processors, does not decide.
+/// Of all parts together, while others are looked for.
+const TOGETHER: Effort = Effort { iterations: 40, step_tolerance: 1e-4 };
+/// Of what was found: the fit ends where rounding, which differs between compilers and processors, does not decide.
 const CONVERGED: Effort = Effort { iterations: 100, step_tolerance: 1e-9 };
 
 /// A prior for the gas, and how well the readings determine it.
@@ -194,7 +196,7 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask, from: Option<&GasParts>) ->
     let score = best.score();
     // What was found in pools is fitted to all bins.
     let search = Search { periodogram: &periodogram, ..search };
-    let best = search.jointly(Fitted::unknown(best.parts));
+    let best = search.jointly(Fitted::unknown(best.parts), &CONVERGED);
     others.retain(|other| kinds(&other.parts) != kinds(&best.parts));
     let missing = 1.0 - got as f64 / periodogram.all as f64;
     let is_uneven = readings.unevenness() > MAX_MISSING_SHARE;
@@ -267,7 +269,8 @@ impl Search<'_> {
     /// - `known`: parts to begin with, where there are some
     fn run(&self, known: Vec<Vec<Part>>) -> (Fitted, Vec<Fitted>) {
         let known_kinds: Vec<Vec<&str>> = known.iter().map(|parts| kinds(parts)).collect();
-        let mut seen: Vec<Fitted> = known.into_par_iter().map(|parts| self.jointly(Fitted::unknown(parts))).collect();
+        let mut seen: Vec<Fitted> =
+            known.into_par_iter().map(|parts| self.jointly(Fitted::unknown(parts), &TOGETHER)).collect();
         let first = if seen.is_empty() { self.first() } else { likeliest(&seen) };
         seen.extend(self.grown(first));
         let mut current = likeliest(&seen);
@@ -284,7 +287,8 @@ impl Search<'_> {
         }
         seen.sort_by(|a, b| a.score().total_cmp(&b.score()));
         let others = nearly_as_likely(kinds(&current.parts), current.score(), seen);
-        (current, others)
+        let others = others.into_par_iter().map(|other| self.jointly(Fitted::unknown(other.parts), &CONVERGED));
+        (current, others.collect())
     }
 
     /// `current` with parts exchanged until that gains nothing. What comes up on the way is added to what was `seen`.
@@ -303,7 +307,7 @@ impl Search<'_> {
 
     /// The single part that explains most.
     fn first(&self) -> Fitted {
-        self.jointly(self.best(&Fitted::unknown(self.noise()), self.kinds().concat()))
+        self.jointly(self.best(&Fitted::unknown(self.noise()), self.kinds().concat()), &TOGETHER)
     }
 
     /// The noise as a part, where it is asked for.
@@ -315,7 +319,8 @@ impl Search<'_> {
     /// numbers fitted again with nothing that folds back.
     fn ended(&self, best: &Fitted) -> (f64, Vec<Part>) {
         let periodogram = self.periodogram.of_ending_gas();
-        let ended = Search { periodogram: &periodogram, ..*self }.jointly(Fitted::unknown(best.parts.clone()));
+        let ended =
+            Search { periodogram: &periodogram, ..*self }.jointly(Fitted::unknown(best.parts.clone()), &CONVERGED);
         let odds_against = (1.0 / ENDS_BEFORE - 1.0) * (0.5 * (ended.score() - best.score())).exp();
         (1.0 / (1.0 + odds_against), ended.parts)
     }
@@ -325,7 +330,7 @@ impl Search<'_> {
         let mut out = vec![from];
         loop {
             let current = &out[out.len() - 1];
-            let next = self.jointly(self.best(current, self.within(&current.parts, self.more(current))));
+            let next = self.jointly(self.best(current, self.within(&current.parts, self.more(current))), &TOGETHER);
             if next.score() >= current.score() - MIN_SCORE_GAIN {
                 return out;
             }
@@ -347,11 +352,11 @@ impl Search<'_> {
         let mut out = Vec::new();
         let mut parts = current.parts.clone();
         parts.remove(i);
-        let others = self.jointly(Fitted::unknown(parts));
+        let others = self.jointly(Fitted::unknown(parts), &TOGETHER);
         for kind in self.kinds() {
             let other = self.best(&others, self.within(&others.parts, kind));
             if other.score() < current.score() + MAX_SCORE_DEFICIT {
-                out.push(self.jointly(other));
+                out.push(self.jointly(other, &TOGETHER));
             }
         }
         if has_gas(&others.parts) {
@@ -361,22 +366,22 @@ impl Search<'_> {
             let mut parts = current.parts.clone();
             parts[i] = otherwise;
             if states(&parts) <= self.room {
-                out.push(self.jointly(Fitted::unknown(parts)));
+                out.push(self.jointly(Fitted::unknown(parts), &TOGETHER));
             }
         }
         out
     }
 
     /// All numbers fitted together, parts that come to nothing left out.
-    fn jointly(&self, current: Fitted) -> Fitted {
+    fn jointly(&self, current: Fitted, effort: &Effort) -> Fitted {
         if !has_gas(&current.parts) || (current.parts.len() == 1 && current.deviance.is_finite()) {
             return current;
         }
-        let mut fitted = self.fit(&current.parts, &self.beside(&current.parts), &CONVERGED);
+        let mut fitted = self.fit(&current.parts, &self.beside(&current.parts), effort);
         let simpler: Vec<Part> =
             fitted.parts.iter().map(|part| part.simpler().unwrap_or_else(|| part.clone())).collect();
         if simpler != fitted.parts {
-            let other = self.fit(&simpler, &self.beside(&simpler), &CONVERGED);
+            let other = self.fit(&simpler, &self.beside(&simpler), effort);
             if other.score() <= fitted.score() {
                 fitted = other;
             }

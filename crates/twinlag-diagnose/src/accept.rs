@@ -1,21 +1,13 @@
-//! What a candidate must stand beside being the best: blocks that its fit has not seen, and a
-//! second opinion.
-//!
-//! The second opinion comes from the readings themselves, with the gas in the state. The whitened
-//! residual knows nothing of the gas: above the frequencies that the gas has, noise of one channel
-//! meets noise of the other in it, and what turns the phase of one of them (a delay, a second lag)
-//! can pick the angle at which they happen to cancel. The likelihood of the readings with the gas
-//! as one process, its spectrum learned from them, has no such term: where the gas is not, it does
-//! not depend on the sensors.
+//! What a candidate must stand beside being the best: blocks that its fit has not seen, and a second opinion.
 
 use std::collections::VecDeque;
 
-use twinlag_compensate::{Form, learn_quickly, reconstruct};
-use twinlag_model::{Extended, Fitted, Observations, Policy, dense, held_out_gain};
+use twinlag_model::{Fitted, dense, held_out_gain};
 use twinlag_optimise::Scale;
 
 use crate::candidates::{Candidate, Search};
 use crate::rank::{Score, rank, threshold, ties};
+use crate::second_opinion::is_confirmed;
 
 impl Search<'_> {
     /// The first of the ranked candidates that is accepted, with those that explain the record as
@@ -37,7 +29,8 @@ impl Search<'_> {
             {
                 let others: Vec<Score> = order.iter().map(|i| scores[*i]).collect();
                 let tied = ties(&first.score(current, self.policy), &others, self.policy);
-                return Some((first, tied.into_iter().map(|i| all[order[i]].clone()).collect()));
+                let tied = tied.into_iter().map(|i| all[order[i]].clone()).collect();
+                return Some(self.by_likelihood(current, first, tied, all));
             }
         }
         None
@@ -74,34 +67,4 @@ impl Search<'_> {
         };
         self.with_noise(without, &taken.effect).as_ref().is_some_and(is_needed)
     }
-}
-
-/// Whether the candidate makes the readings more probable than `without` does, and by more than
-/// chance, where chance might have brought it about.
-fn is_confirmed(candidate: &Candidate, without: &Fitted, observations: &Observations, policy: &Policy) -> bool {
-    if !candidate.effect.about().turns_phases || without.mean_energy() > policy.far_off_energy {
-        return true;
-    }
-    let likelihood = |fitted| log_likelihood(fitted, observations);
-    let (before, after) = rayon::join(|| likelihood(without), || likelihood(&candidate.fitted));
-    let least = threshold(candidate.added, policy.round_false_alarm_probability);
-    // What has no such likelihood is judged without.
-    before.zip(after).is_none_or(|(before, after)| 2.0 * (after - before) > least)
-}
-
-/// Logarithm of the likelihood of the readings, up to what is the same for all models of a record; of several records that of
-/// all of them, each with a gas of its own.
-fn log_likelihood(fitted: &Fitted, observations: &Observations) -> Option<f64> {
-    let members = observations.members();
-    members.iter().map(|member| of_one_record(fitted, &observations.of_member(member.number))).sum()
-}
-
-fn of_one_record(fitted: &Fitted, observations: &Observations) -> Option<f64> {
-    let (readings, rig) = Extended::new(fitted, observations).rig(&fitted.theta).ok()?;
-    let prior = learn_quickly(&readings, &rig).ok()?.prior;
-    let gas = reconstruct(&readings, &rig, &prior, Form::Filter).ok()?;
-    // Of the readings as they were before they were taken back through a gain.
-    let noise_std_k = fitted.model.noise_std_k();
-    let gains = (0..2).map(|i| (rig.sensors[i].noise_std_k / noise_std_k[i]).ln()).sum::<f64>();
-    Some(gas.log_likelihood + 0.5 * gas.innovations as f64 * gains)
 }

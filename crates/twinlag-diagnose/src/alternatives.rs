@@ -163,7 +163,11 @@ impl Search<'_> {
             fitted,
             ..taken.clone()
         };
-        let advantage = white_gain.min(robust_gain) - more * candidate.fitted.count.max(2.0).ln();
+        let of_residuals = white_gain.min(robust_gain) - more * candidate.fitted.count.max(2.0).ln();
+        let turn_phases = [&taken.effect, other].iter().all(|effect| effect.about().turns_phases);
+        let of_readings =
+            turn_phases.then(|| self.likelihood_advantage(current, &candidate.fitted, of_residuals, more));
+        let advantage = of_readings.flatten().unwrap_or(of_residuals);
         Some(Replacement { candidate, advantage })
     }
 }

@@ -61,6 +61,7 @@ mod propagate;
 mod rank;
 mod rapid;
 mod remark;
+mod second_opinion;
 mod size;
 mod ties;
 mod transfer;

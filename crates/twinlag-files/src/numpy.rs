@@ -17,6 +17,13 @@ use crate::records::{self, Field, Meaning, Number};
 use crate::series::{Loaded, Opened, Series, Values};
 use crate::variables::{Arranged, Variable, arrange, period_s};
 
+/// What a file begins with: its mark, and the version of its header, whose length comes next.
+const MAGIC_BYTES: usize = 8;
+const MAJOR_VERSION_AT: usize = 6;
+/// Limits of a header. NumPy reads no more than 10 000 bytes unless asked to, and each record within a record takes two brackets.
+const MAX_HEADER_BYTES: usize = 1 << 20;
+const MAX_BRACKET_DEPTH: usize = 12;
+
 struct Numpy {
     archive: Archive,
     arrays: Vec<Array>,
@@ -113,8 +120,41 @@ impl<R: Read> Read for Counted<R> {
     }
 }
 
+/// Reads the header. Reading brackets within brackets takes the library twice as long for each: forty keep it busy for hours.
 fn header(reader: &mut impl Read) -> Result<NpyHeader, Fault> {
-    NpyHeader::from_reader(reader).map_err(|error| Fault::damaged_at(0, "the header of an array", error))
+    let damaged = |error| Fault::damaged_at(0, "the header of an array", error);
+    let mut head = Vec::new();
+    let mut read = |bytes: usize| -> Result<Vec<u8>, Fault> {
+        let start = head.len();
+        reader.take(bytes as u64).read_to_end(&mut head)?;
+        Ok(head[start..].to_vec())
+    };
+    let length_bytes = if read(MAGIC_BYTES)?.get(MAJOR_VERSION_AT) == Some(&1) { 2 } else { 4 };
+    let length = read(length_bytes)?.iter().rev().fold(0, |sum, byte| (sum << 8) | usize::from(*byte));
+    if length > MAX_HEADER_BYTES {
+        return Err(damaged(format!("one of {length} bytes, {MAX_HEADER_BYTES} at most")));
+    }
+    let depth = bracket_depth(&read(length)?);
+    if depth > MAX_BRACKET_DEPTH {
+        return Err(damaged(format!("brackets {depth} deep, {MAX_BRACKET_DEPTH} at most")));
+    }
+    NpyHeader::from_reader(&head[..]).map_err(|error| damaged(error.to_string()))
+}
+
+/// How many brackets are open at once, at most; those in names are none.
+fn bracket_depth(text: &[u8]) -> usize {
+    let (mut quote, mut open, mut deepest) = (None, 0_usize, 0);
+    for &byte in text {
+        match (quote, byte) {
+            (Some(begun), _) => quote = Some(begun).filter(|begun| *begun != byte),
+            (None, b'\'' | b'"') => quote = Some(byte),
+            (None, b'(' | b'[' | b'{') => open += 1,
+            (None, b')' | b']' | b'}') => open = open.saturating_sub(1),
+            _ => {}
+        }
+        deepest = deepest.max(open);
+    }
+    deepest
 }
 
 /// An array is as long as its header says, to the byte.

@@ -200,8 +200,11 @@ pub trait Effect: Send + Sync {
         Vec::new()
     }
 
-    /// Puts `values`, and the time constants, s, into their conventional order where the model is the same for several.
-    fn order(&self, _values: &mut [f64], _tau_s: &mut [f64]) {}
+    /// Which of its parameters may change places with the time constant of its sensor, the model being the same; the time constant is
+    /// the larger by convention. `None` if there is no such parameter.
+    fn interchangeable(&self) -> Option<usize> {
+        None
+    }
 
     /// Which effect it is.
     fn identifier(&self) -> Identifier {

@@ -4,6 +4,7 @@ use twinlag_optimise::{Budget, Cost, End, Fit, Minimiser, Optimiser, Problem, Va
 
 use crate::cost::{Linearised, ResidualCost};
 use crate::dense;
+use crate::lag_pair::LagPair;
 use crate::model::Model;
 use crate::normal::NormalEquations;
 use crate::observations::{Observations, evenly_spread};
@@ -99,12 +100,9 @@ impl Fitted {
     /// This fit with parameters in their conventional order, where the model is the same for several.
     #[must_use]
     pub fn in_order(mut self) -> Self {
-        let is_free = |sensor: usize| self.model.known.iter().all(|k| k.sensor != sensor);
-        for (index, effect) in self.model.effects.iter().enumerate() {
-            if effect.channel().is_some_and(is_free) {
-                let range = self.model.range(index);
-                let (tau_s, rest) = self.theta.split_at_mut(2);
-                effect.order(&mut rest[range.start - 2..range.end - 2], tau_s);
+        for LagPair { larger, smaller } in LagPair::each(&self.model) {
+            if self.theta[larger] < self.theta[smaller] {
+                self.theta.swap(larger, smaller);
             }
         }
         self.report.x.clone_from(&self.theta);
@@ -305,7 +303,7 @@ impl Model {
     }
 
     /// Inverse of half the second derivatives of the energy; of the products of first ones where those are not positive
-    /// definite.
+    /// definite. Of two lags of one sensor they are those by their sum and product.
     pub(crate) fn curvature(
         &self,
         theta: &[f64],
@@ -313,7 +311,8 @@ impl Model {
         selection: &Selection,
         normal: &NormalEquations,
     ) -> Option<Vec<Vec<f64>>> {
-        let second = self.second_derivatives(theta, observations, selection, normal, &[]);
+        let mut second = self.second_derivatives(theta, observations, selection, normal, &[]);
+        LagPair::each(self).for_each(|pair| pair.straighten(&mut second, &normal.slope, theta));
         dense::inverse(&second).or_else(|| dense::inverse(&normal.products))
     }
 }

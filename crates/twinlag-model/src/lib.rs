@@ -25,6 +25,7 @@ mod influence;
 mod instants;
 mod inverse;
 mod known;
+mod lag_pair;
 mod member_noise;
 mod mismatch_bias;
 mod model;

@@ -11,6 +11,7 @@ use crate::extended::Extended;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::{ModelFit, TimeConstant};
 use crate::influence::Influence;
+use crate::lag_pair::{self, LagPair};
 use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;
 use crate::policy::Policy;
@@ -88,14 +89,15 @@ fn is_correlated(observations: &Observations, channel: usize) -> bool {
 
 /// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first
 /// ones, for white noise or, where the residual is not that, with its own autocorrelation; and that of a mismatch of the gas, of which
-/// the record does not say at which sensor it is.
+/// the record does not say at which sensor it is. Two lags of one sensor may be equal in it.
 pub fn covariance(
     fitted: &Fitted,
     observations: &Observations,
     selection: &Selection,
     by_residual: bool,
 ) -> Option<Vec<Vec<f64>>> {
-    let Fitted { model, theta, .. } = fitted;
+    let apart = lag_pair::apart(fitted);
+    let Fitted { model, theta, .. } = &apart;
     let normal = model.scored_normal_equations(theta, observations, selection, None);
     let inverse = model.curvature(theta, observations, selection, &normal)?;
     let white = normal.slope_covariance;
@@ -110,7 +112,8 @@ pub fn covariance(
         white
     };
     let mut out = dense::product(&dense::product(&inverse, &middle), &inverse);
-    fitted.mismatch_covariance(observations, selection).iter().for_each(|other| dense::add(&mut out, other));
+    apart.mismatch_covariance(observations, selection).iter().for_each(|other| dense::add(&mut out, other));
+    LagPair::each(model).for_each(|pair| pair.carry(&mut out, theta, &fitted.theta));
     Some(out)
 }
 

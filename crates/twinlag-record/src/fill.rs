@@ -194,7 +194,7 @@ fn plain_numbers(line: &[u8], delimiter: Delimiter, row: &mut [f64]) -> bool {
         return false;
     }
     let blanks = |at: usize| line[at..].iter().take_while(|byte| **byte == b' ').count();
-    let last = row.len() - 1;
+    let Some(last) = row.len().checked_sub(1) else { return false };
     let mut at = 0;
     for (index, value) in row.iter_mut().enumerate() {
         at += blanks(at);

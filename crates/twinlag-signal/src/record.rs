@@ -66,7 +66,11 @@ impl Record {
         if let Some(settle_s) = self.settle_s {
             not_negative("record", "settle_s", settle_s)?;
         }
-        let samples = self.samples as f64 + self.settle_samples(needed_s);
-        grid::check_size(samples * self.oversampling as f64, "record.settle_s")
+        grid::check_size(self.steps(needed_s), "record.settle_s")
+    }
+
+    /// Steps of the integration, those of the run-in that the sensors need among them.
+    pub(crate) fn steps(&self, needed_s: f64) -> f64 {
+        (self.samples as f64 + self.settle_samples(needed_s)) * self.oversampling as f64
     }
 }

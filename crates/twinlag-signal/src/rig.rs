@@ -293,6 +293,22 @@ impl Rig {
         Ok(self.clean(trial)?.with_noise(&mut self.noise_streams(trial)))
     }
 
+    /// Steps of the integration of one trial, those of the run-in among them: what a simulation costs.
+    ///
+    /// ```
+    /// # use twinlag_signal::{Gas, Record, Rig, Sensor, Signal, Tone};
+    /// let gas = Gas::new(300.0, Signal::Sine(Tone::new(10.0, 2.0)));
+    /// let mut record = Record::new(1000, 0.01);
+    /// record.settle_s = Some(1.0);
+    /// record.oversampling = 4;
+    /// let rig = Rig::new(1, record, gas, [Sensor::new("T1", 0.05), Sensor::new("T2", 0.3)])?;
+    /// assert_eq!(rig.steps(), 4.0 * 1100.0);
+    /// # Ok::<(), twinlag_signal::SignalError>(())
+    /// ```
+    pub fn steps(&self) -> f64 {
+        self.record.steps(self.run_in_s())
+    }
+
     /// The record of one trial before noise and ADC. Does not depend on `trial` unless
     /// [`Gas::per_trial`].
     ///

@@ -184,6 +184,10 @@ impl Part {
         }
     }
 
+    pub(super) const fn is_comb(&self) -> bool {
+        matches!(self, Self::Comb { .. })
+    }
+
     /// A comb that ends in place of one that goes on, and the other way about.
     pub(super) fn otherwise(&self) -> Option<Self> {
         match self {

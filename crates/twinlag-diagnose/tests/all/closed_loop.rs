@@ -10,7 +10,8 @@ use twinlag_diagnose::{
     Diagnosis, Found, Grade, Identifier, KnownEffect, Observations, Settings, Stretch, Verdict, fit_with,
 };
 use twinlag_signal::{
-    ColouredNoise, Engine, Gas, Noise, Record, Rig, Sensor, Signal, Spikes, TemperatureDependence, Turbulence,
+    Broadband, ColouredNoise, Engine, Gas, Noise, Record, Rig, Sensor, Signal, Simulated, Spikes,
+    TemperatureDependence, Turbulence,
 };
 
 /// Offset of T2, K. In white noise its standard error is `σ √2/√n` = 0.0026 K.
@@ -192,6 +193,28 @@ fn an_unknown_second_lag_is_not_misnamed() {
 fn a_drift_is_found() {
     let d = found(&record(SEED, drift));
     is_sized(is_inferred(&d, Identifier::DRIFT), "drift", DRIFT_K_PER_S);
+}
+
+/// A second lag nearly as long as the first. Failed: the residuals alone, of which the energies differ by chance, made a delay of it that
+/// was `go`; and where both lags come out equal, a covariance that knew nothing of their difference gave them to 3 %.
+#[test]
+fn two_lags_that_may_be_equal_are_no_delay() {
+    let lags_s = [0.15, 0.12];
+    let mut sensors = [Sensor::new("T1", lags_s[0]), Sensor::new("T2", 0.6)];
+    sensors[0].second_time_constant_s = Some(lags_s[1]);
+    sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(1.0)));
+    let gas = Gas::new(350.0, Signal::Broadband(Broadband { std_k: 16.0, corner_hz: 0.27 }));
+    let record = Rig::new(1, Record::new(2000, 0.02), gas, sensors).expect("a valid rig").simulate();
+    let Simulated { time_s, t1_c, t2_c, .. } = record.expect("a rig of finite numbers");
+    let stretch = Stretch::new(time_s, [t1_c, t2_c]);
+    let d = found(&Observations::new(vec![stretch], Some(0.02)).expect("finite and long"));
+    let named: Vec<_> = d.effects.iter().map(|found| (found.effect, found.channel)).collect();
+    assert_eq!(named, [(Identifier::SECOND_ORDER, Some(0))], "{}", told(&d));
+    let second = d.effects[0].parameters[0].interval_95.expect("it is determined");
+    let first = d.last.time_constants[0].interval_95_s.expect("it is determined");
+    for (lag_s, [low_s, high_s]) in lags_s.into_iter().zip([first, second]) {
+        assert!(low_s < lag_s && lag_s < high_s, "{lag_s} s in [{low_s}, {high_s}]: {}", told(&d));
+    }
 }
 
 /// Failed: "explained" by coloured noise, correlated over 0.15 s of 3 s.

@@ -55,10 +55,7 @@ impl Effect for SecondOrder {
         plant.sensors[self.sensor].second_tau_s = Some(values[0]);
     }
 
-    /// The larger lag is the time constant: the product does not distinguish them.
-    fn order(&self, values: &mut [f64], tau_s: &mut [f64]) {
-        if values[0] > tau_s[self.sensor] {
-            std::mem::swap(&mut values[0], &mut tau_s[self.sensor]);
-        }
+    fn interchangeable(&self) -> Option<usize> {
+        Some(0)
     }
 }
