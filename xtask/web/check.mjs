@@ -222,7 +222,7 @@ async function stops(open) {
   await page.click("#diagnose");
   await page.waitForSelector("#period:invalid");
   // One that is typed, and the diagnosis asked for at once: it waits for the files to be read anew.
-  await page.fill("#period", "0.5");
+  await page.fill("#period", "500 ms");
   await diagnosed(page);
   if (!(await page.textContent("#read")).includes("one every 0.5 s")) fail("period", await page.textContent("#read"));
   await page.close();

@@ -65,8 +65,11 @@ pub(crate) fn ask(
 pub(crate) fn model(path: &Path) -> Result<Model, Failure> {
     let wrong = |what: String| Failure::File(format!("{}: {what}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
-    let model: Model = serde_json::from_str(&text)
-        .map_err(|e| wrong(format!("expected a model written by `twinlag diagnose --save`: {e}")))?;
+    let expected = "expected a model written by `twinlag diagnose --save`";
+    if !text.trim_start().starts_with('{') {
+        return Err(wrong(format!("{expected}, which is JSON and begins with {{, got another file")));
+    }
+    let model: Model = serde_json::from_str(&text).map_err(|e| wrong(format!("{expected}: {e}")))?;
     if model.schema == Model::SCHEMA {
         Ok(model)
     } else {

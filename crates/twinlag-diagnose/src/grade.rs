@@ -180,8 +180,6 @@ pub enum Reason {
     HeldAtModel {
         /// The record that the model was found in, where that is known.
         source: Option<String>,
-        /// Whether that is the record at hand.
-        is_own: bool,
     },
     /// A model without effects is used on another record than its own.
     NothingInModel {
@@ -435,10 +433,7 @@ impl fmt::Display for Reason {
             Self::Biased => f.write_str("right if the noise is negligible: it biases this estimator"),
             Self::Fault { what, .. } => f.write_str(what),
             Self::Follows { from, because, .. } => write!(f, "it follows from {from}: {because}"),
-            Self::HeldAtModel { is_own: true, .. } => f.write_str(
-                "right if the numbers of the model, found in this record, are exact: the interval does not cover that",
-            ),
-            Self::HeldAtModel { source, .. } => write!(
+            Self::HeldAtModel { source } => write!(
                 f,
                 "right if the sensors are those of {} and the numbers of the model exact: the interval does not cover that",
                 source.as_deref().unwrap_or("the model")

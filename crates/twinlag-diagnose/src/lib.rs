@@ -87,7 +87,7 @@ pub use transfer::{EffectInChannel, LeftOut, Transfer};
 pub use twinlag_model::{
     About, Change, ChangePoint, Contradicted, Extended, Identifier, Instants, KnownEffect, KnownFit, KnownTimeConstant,
     Line, ModelError, ModelFit, Observations, OwnValue, Policy, RatioTest, ResidualPart, Settings, Stretch,
-    TimeConstant, Trace, Track, Value, Watch, evenly_spread, fit_with, track,
+    TimeConstant, Trace, Track, Value, Watch, evenly_spread, fit_again_with, fit_with, track,
 };
 pub use twins::ExactTwin;
 

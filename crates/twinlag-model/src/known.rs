@@ -46,9 +46,30 @@ pub fn fit_with(
     settings: &Settings,
     effects: &[KnownEffect],
 ) -> Result<KnownFit, ModelError> {
-    let Known { prepared, fitted, fitted_again } = Known::of(observations, settings, effects)?;
-    let fit = summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels, &prepared.policy);
-    Ok(KnownFit { fit, fitted_again })
+    Ok(Known::of(observations, settings, effects, Numbers::Held)?.summarised())
+}
+
+/// As [`fit_with`], of the record that `effects` were found in: a fit of all their numbers, noise aside, begins with those that are known, so
+/// that the intervals of the time constants cover their uncertainty.
+///
+/// # Errors
+/// As [`fit_with`].
+pub fn fit_again_with(
+    observations: &Observations,
+    settings: &Settings,
+    effects: &[KnownEffect],
+) -> Result<KnownFit, ModelError> {
+    let KnownFit { fit, .. } = Known::of(observations, settings, effects, Numbers::Fitted)?.summarised();
+    Ok(KnownFit { fit, fitted_again: effects.iter().map(|known| known.effect).collect() })
+}
+
+/// What is done with the numbers of effects that are known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Numbers {
+    /// They stay as they are, but for those that belong to a record.
+    Held,
+    /// A fit begins with them.
+    Fitted,
 }
 
 /// A record with the model of it whose effects were known.
@@ -59,10 +80,17 @@ pub(crate) struct Known {
 }
 
 impl Known {
+    fn summarised(self) -> KnownFit {
+        let Self { prepared, fitted, fitted_again } = self;
+        let fit = summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels, &prepared.policy);
+        KnownFit { fit, fitted_again }
+    }
+
     pub(crate) fn of(
         observations: &Observations,
         settings: &Settings,
         effects: &[KnownEffect],
+        numbers: Numbers,
     ) -> Result<Self, ModelError> {
         let mut prepared = Prepared::new(observations, settings)?;
         // Nothing is searched for that blocks would have to judge.
@@ -98,6 +126,11 @@ impl Known {
         let fit_again =
             |from: &Fitted| from.model.fit(&from.theta, &prepared.observations, &prepared.everything, Effort::Look);
         let mut fitted = fit(&prepared, &model).in_own_gas(&prepared.observations, fit_again);
+        if numbers == Numbers::Fitted {
+            fitted.model.is_frozen = false;
+            let Prepared { observations, everything, .. } = &prepared;
+            fitted = fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order();
+        }
         model = fitted.model.clone();
         let has_spikes = settings.effects.contains(&Identifier::SPIKES) && prepared.mask_spikes(&fitted);
         let has_line = model.effects.iter().any(|e| e.about().is_narrow);

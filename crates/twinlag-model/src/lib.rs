@@ -69,7 +69,7 @@ pub use gas::Gas;
 pub use held_out::{held_out_energy, held_out_gain};
 pub use implied::Evaluation;
 pub use instants::Instants;
-pub use known::fit_with;
+pub use known::{fit_again_with, fit_with};
 pub use model::{KnownTimeConstant, Model};
 pub use normal::{Beside, NormalEquations};
 pub use num_dual::DualNum;

@@ -108,9 +108,11 @@ fn falls_often(values: &[f64]) -> bool {
     falls > 1 + values.len() / MIN_ROWS_OF_TURN
 }
 
-/// Refuses a time that was guessed where a clock beside it shows another one, in the ratio of two units; notes where one differs otherwise.
+/// Refuses a time that was guessed where a clock beside it shows another one, in the ratio of two units; notes where one differs otherwise, from
+/// the period of a record without a time column as well.
 ///
 /// - `unit`: the unit that the caller chose
+/// - `period_s`: that of rows without a time
 ///
 /// # Errors
 /// [`RecordError::TimesDisagree`], and those of reading the time.
@@ -118,15 +120,28 @@ pub(crate) fn expect_agreement(
     table: &Table,
     chosen: &Chosen,
     unit: Option<&Unit>,
+    period_s: f64,
     notes: &mut Vec<Note>,
 ) -> Result<(), RecordError> {
-    let Some(time) = chosen.time else { return Ok(()) };
     let taken = chosen.columns();
     let others = (0..table.columns().len()).filter(|index| !taken.contains(index));
     let clocks: Vec<(usize, Shown)> = others.filter_map(|index| Some((index, Shown::by(table, index)?))).collect();
     if clocks.is_empty() {
         return Ok(());
     }
+    let Some(time) = chosen.time else {
+        let passed_s = (table.rows() - 1) as f64 * period_s;
+        let shown_s =
+            clocks.iter().map(|(index, shown)| (*index, shown.between(0, table.rows() - 1), shown.resolution_s));
+        let other = shown_s.filter(|(_, shown_s, resolution_s)| !agree(passed_s, *shown_s, *resolution_s));
+        notes.extend(other.map(|(index, shown_s, _)| Note::PeriodDiffers {
+            period_s,
+            passed_s,
+            other: table.title(index),
+            other_s: shown_s,
+        }));
+        return Ok(());
+    };
     let index = match time {
         TimeColumns::One(index) => index,
         TimeColumns::DateAndTime { time, .. } => time,
@@ -144,8 +159,7 @@ pub(crate) fn expect_agreement(
     };
     for (other, shown) in clocks {
         let other_s = shown.between(0, table.rows() - 1);
-        let tolerance_s = MAX_CLOCK_ERROR * passed_s.max(other_s) + 2.0 * shown.resolution_s;
-        if (passed_s - other_s).abs() <= tolerance_s {
+        if agree(passed_s, other_s, shown.resolution_s) {
             continue;
         }
         let [one, other] = [index, other].map(|index| table.title(index));
@@ -156,6 +170,11 @@ pub(crate) fn expect_agreement(
         notes.push(Note::ClocksDiffer { column: one, passed_s, other, other_s });
     }
     Ok(())
+}
+
+/// Whether two clocks show the same time to have passed, s.
+fn agree(passed_s: f64, other_s: f64, resolution_s: f64) -> bool {
+    (passed_s - other_s).abs() <= MAX_CLOCK_ERROR * passed_s.max(other_s) + 2.0 * resolution_s
 }
 
 /// Whether two clocks differ as if one were read in the unit of the other.

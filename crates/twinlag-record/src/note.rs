@@ -144,6 +144,17 @@ pub enum Note {
         /// How often it begins anew.
         times: usize,
     },
+    /// The rows of a record take another time by the period than by a column that shows one.
+    PeriodDiffers {
+        /// The period that was taken, s.
+        period_s: f64,
+        /// The time that it makes of all rows, s.
+        passed_s: f64,
+        /// The column.
+        other: String,
+        /// The time that it shows, s.
+        other_s: f64,
+    },
     /// Time was counted from the row number and a period.
     PeriodGiven {
         /// The period.
@@ -329,6 +340,13 @@ impl fmt::Display for Note {
             Self::PeriodGiven { period_s, is_of_file } => {
                 let by = if *is_of_file { "as its header says" } else { "as given" };
                 write!(f, "time counted from the row number, {period_s} s per row {by}; no time column was used")
+            }
+            Self::PeriodDiffers { period_s, passed_s, other, other_s } => {
+                let [passed, other_s] = [*passed_s, *other_s].map(brief);
+                write!(
+                    f,
+                    "the rows take {passed} s at the period of {period_s} s, which was taken, and {other_s} s by column {other}"
+                )
             }
             Self::CutLine { line, found, expected } => {
                 write!(f, "last line {line} is cut off ({found} of {expected} cells) and was left out")

@@ -164,8 +164,9 @@ impl Record {
     pub fn from_owned(mut table: Table, selection: &Selection) -> Result<Self, RecordError> {
         let mut notes = Vec::new();
         let chosen = choose(&table, selection, &mut notes)?;
+        let period_s = selection.period_s.or(table.period_s()).unwrap_or(1.0);
         if selection.time.is_none() {
-            expect_agreement(&table, &chosen, selection.time_unit.as_ref(), &mut notes)?;
+            expect_agreement(&table, &chosen, selection.time_unit.as_ref(), period_s, &mut notes)?;
         }
         let (time_s, clock) = match (chosen.time, selection.period_s) {
             (Some(columns), _) => {
@@ -174,7 +175,6 @@ impl Record {
                 (time_s, Some(clock))
             }
             (None, given) => {
-                let period_s = given.or(table.period_s()).unwrap_or(1.0);
                 notes.push(Note::PeriodGiven { period_s, is_of_file: given.is_none() });
                 let time_s = (0..table.rows()).map(|row| row as f64 * period_s).collect();
                 // Row numbers times a period show no clock.

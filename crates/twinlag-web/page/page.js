@@ -316,9 +316,15 @@
     return isValid("noise", isEmptyOrPair, "expected the noise of the first and of the second sensor in K, without its unit, such as 0.1 0.15");
   }
 
+  // NaN where it is no time.
+  function periodSeconds() {
+    const [, number, unit] = decimal("period").match(/^(\S*?)\s*(s|ms|us|µs)?$/u) ?? [];
+    return number ? Number(number) * { s: 1, ms: 1e-3, us: 1e-6, µs: 1e-6 }[unit ?? "s"] : NaN;
+  }
+
   function checkPeriod() {
-    const text = decimal("period");
-    return isValid("period", text === "" || (Number.isFinite(Number(text)) && Number(text) > 0), "expected a number of seconds, such as 0.01");
+    const isTime = Number.isFinite(periodSeconds()) && periodSeconds() > 0;
+    return isValid("period", decimal("period") === "" || isTime, "expected a time, such as 0.01 or 10 ms");
   }
 
   // Says what is expected where an input is not valid.
@@ -390,7 +396,7 @@
   // At once, and not when the field is left for the button, which would move from under the pointer.
   for (const id of [...knownInputs, "period"]) byId(id).addEventListener("input", forgetAnswer);
   byId("period").addEventListener("change", () => {
-    if (checkPeriod()) choose("period_s", Number(decimal("period")) || undefined);
+    if (checkPeriod()) choose("period_s", periodSeconds() || undefined);
   });
   // Anywhere: a file that misses its place would be opened instead of the page.
   addEventListener("dragover", (event) => { event.preventDefault(); byId("drop").classList.add("over"); });

@@ -203,6 +203,21 @@ fn a_period_stands_in_for_the_time_column() {
     }
 }
 
+/// Ten rows half a second apart in the file: at that period nothing is said.
+#[test]
+fn a_period_that_contradicts_the_time_of_the_file_says_so() {
+    let with = |period_s| {
+        let selection = Selection { period_s: Some(period_s), ..Selection::default() };
+        notes(&record_with(plain().as_bytes(), &selection).unwrap())
+    };
+    assert!(!with(0.5).contains("by column"), "{}", with(0.5));
+    let said = with(0.25);
+    assert!(
+        said.contains("the rows take 2.25 s at the period of 0.25 s, which was taken, and 4.5 s by column"),
+        "{said}"
+    );
+}
+
 #[test]
 fn columns_are_chosen_by_name_number_and_name_without_unit() {
     let text = rows("a [s],b [°C],3,c [°C]", |_, t, a, b| format!("{t},{a},{b},{}", a + b));

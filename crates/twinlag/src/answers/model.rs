@@ -194,6 +194,11 @@ impl Model {
         known.collect()
     }
 
+    /// Whether it was found in `record`.
+    pub(crate) fn is_of(&self, record: &Record) -> bool {
+        self.found_in.as_ref().is_some_and(|data| data.is(record))
+    }
+
     /// What numbers rest on that are found in `record` with this model, the gravest first.
     ///
     /// - `fitted_again`: effects that are not held at its numbers
@@ -201,10 +206,13 @@ impl Model {
         let mut out: Vec<Reason> = self.incomplete().into_iter().collect();
         let held: Vec<&ModelEffect> =
             self.effects.iter().filter(|e| e.is_of_the_rig() && !fitted_again.contains(&e.effect)).collect();
-        let is_own = self.found_in.as_ref().is_some_and(|data| data.is(record));
+        if self.is_of(record) {
+            out.extend(self.of_its_time_constants());
+            return out;
+        }
+        let source = self.found_in.as_ref().map(|data| data.source.clone());
         if held.is_empty() {
-            let source = self.found_in.as_ref().map(|data| data.source.clone());
-            out.extend(if is_own { self.of_its_time_constants() } else { Some(Reason::NothingInModel { source }) });
+            out.push(Reason::NothingInModel { source });
             return out;
         }
         let no_go: Vec<String> =
@@ -220,7 +228,7 @@ impl Model {
         if !outside.is_empty() {
             out.push(Reason::OutsideRange { what: outside.join(", ") });
         }
-        out.push(Reason::HeldAtModel { source: self.found_in.as_ref().map(|data| data.source.clone()), is_own });
+        out.push(Reason::HeldAtModel { source });
         // One of them says enough.
         let conditional = numbers(&held).find(|(_, p)| p.grade == Some(Grade::Conditional));
         out.extend(conditional.map(|(effect, p)| Reason::Follows {

@@ -1,8 +1,8 @@
 //! A record with the effects of a model that was found in another one.
 
 use twinlag_diagnose::{
-    Basis, Circumstances, Identifier, ModelFit, Observations, Reason, Remark, Settings, excess, fit_with,
-    is_single_tone,
+    Basis, Circumstances, Identifier, ModelFit, Observations, Reason, Remark, Settings, excess, fit_again_with,
+    fit_with, is_single_tone,
 };
 use twinlag_record::Record;
 
@@ -16,7 +16,8 @@ use crate::verbs::characterise;
 /// Chosen.
 const MIN_FLOW_DIFFERENCE: f64 = 0.01;
 
-/// Estimates both time constants of `record`, with the effects of `model` held fixed.
+/// Estimates both time constants of `record`, with the effects of `model` held fixed; on the record that it was found in they are fitted
+/// again from there, so that the intervals cover their uncertainty.
 ///
 /// # Errors
 /// As [`crate::diagnose()`]; [`Error::ModelChannels`] and [`Error::ModelNumber`] for a model of other
@@ -58,7 +59,9 @@ pub(crate) fn with_model(
     let noise_std_k = options.noise_std_k.or(noisy.and_then(|m| m.noise_std_k));
     let settings = Settings { noise_std_k, ..settings_of(options) };
     let effects = model.map(Model::known_effects).unwrap_or_default();
-    let mut known = fit_with(&observations, &settings, &effects)?;
+    let is_own = model.is_some_and(|model| model.is_of(record));
+    let fit = if is_own { fit_again_with } else { fit_with };
+    let mut known = fit(&observations, &settings, &effects)?;
     let policy = &settings.policy;
     let excess = excess(&known.fit, noisy.is_some());
     let mut basis = Basis::of(excess, !settings.known.is_empty(), policy);
@@ -94,14 +97,14 @@ pub(crate) fn with_model(
     let listed = |effects: &mut dyn Iterator<Item = Identifier>| -> String {
         effects.map(Identifier::name).collect::<Vec<_>>().join(", ")
     };
-    if !effects.is_empty() {
+    if !effects.is_empty() && !is_own {
         let names = listed(&mut effects.iter().map(|e| e.effect));
         out.warnings.push(format!(
             "effects held at the values of the model: {names}. The intervals do not cover the uncertainty of these values"
         ));
     }
     out.warnings.extend(model.and_then(|model| at_other_flow(model, &observations)));
-    if !known.fitted_again.is_empty() {
+    if !known.fitted_again.is_empty() && !is_own {
         let again = listed(&mut known.fitted_again.iter().copied());
         out.warnings.push(format!("effects fitted again, because they belong to a record and not to the rig: {again}"));
     }
