@@ -196,7 +196,7 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask, from: Option<&GasParts>) ->
     let score = best.score();
     // What was found in pools is fitted to all bins.
     let search = Search { periodogram: &periodogram, ..search };
-    let best = search.jointly(Fitted::unknown(best.parts), &CONVERGED);
+    let best = search.converged(best);
     others.retain(|other| kinds(&other.parts) != kinds(&best.parts));
     let missing = 1.0 - got as f64 / periodogram.all as f64;
     let is_uneven = readings.unevenness() > MAX_MISSING_SHARE;
@@ -287,8 +287,12 @@ impl Search<'_> {
         }
         seen.sort_by(|a, b| a.score().total_cmp(&b.score()));
         let others = nearly_as_likely(kinds(&current.parts), current.score(), seen);
-        let others = others.into_par_iter().map(|other| self.jointly(Fitted::unknown(other.parts), &CONVERGED));
-        (current, others.collect())
+        let current = self.converged(current);
+        let mut others: Vec<Fitted> = others.into_par_iter().map(|other| self.converged(other)).collect();
+        // Fitted to the end, some may have become simpler, and the same as others.
+        others.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        let others = nearly_as_likely(kinds(&current.parts), current.score(), others);
+        (current, others)
     }
 
     /// `current` with parts exchanged until that gains nothing. What comes up on the way is added to what was `seen`.
@@ -388,6 +392,11 @@ impl Search<'_> {
         }
         fitted.parts.retain(|p| !p.is_nothing(&self.limits));
         fitted
+    }
+
+    /// All numbers of a gas fitted to the end.
+    fn converged(&self, found: Fitted) -> Fitted {
+        if has_gas(&found.parts) { self.jointly(Fitted::unknown(found.parts), &CONVERGED) } else { found }
     }
 
     /// The `candidates` for which `parts` leave room.

@@ -184,6 +184,7 @@ impl Part {
         }
     }
 
+    /// Whether it has lines at the multiples of a frequency.
     pub(super) const fn is_comb(&self) -> bool {
         matches!(self, Self::Comb { .. })
     }

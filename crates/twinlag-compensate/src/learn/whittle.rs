@@ -15,9 +15,8 @@ pub(super) const BINS_PER_ONE: f64 = 1.944;
 /// determine are known within a factor of e.
 const LOG_STD: f64 = 1.0;
 
-/// Odds against a comb before the readings. It may begin anywhere, end after any of its lines or go on, and its lines may have any size;
-/// the numbers of a given one, each known within a factor of e, say little of that. Without it, six of 448 records of broadband and
-/// turbulent gas had a comb, whose gain made it up to 100 times as likely as none; those of engines are beyond e⁴⁰⁰.
+/// Odds against a comb before the readings: it may begin anywhere, end after any line or go on, and have lines of any size, of which a
+/// factor of e for each number says little. Chosen: a comb of chance gains less (test `chance_is_not_learned_as_a_comb`).
 const ODDS_AGAINST_COMB: f64 = 1000.0;
 
 /// Twice the negative logarithm of Whittle's likelihood.
