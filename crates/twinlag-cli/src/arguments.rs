@@ -145,7 +145,7 @@ pub(crate) struct Characterise {
     #[arg(value_name = "MORE")]
     pub(crate) more: Vec<PathBuf>,
     /// Use a model written by `twinlag diagnose --save`: its effects stay fixed and only the time
-    /// constants are fitted.
+    /// constants are fitted, except on its own record, where all are.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
 }
@@ -234,7 +234,7 @@ pub(crate) struct Compensate {
     #[arg(long = "static", requires = "report")]
     pub(crate) is_static: bool,
     /// Use a model written by `twinlag diagnose --save` instead of diagnosing this record; its
-    /// effects stay fixed.
+    /// effects stay fixed, except on its own record.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
     /// Save the model with what the gas is like, for `--model` with other records: the search for what

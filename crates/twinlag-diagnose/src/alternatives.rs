@@ -4,7 +4,7 @@
 use twinlag_model::{Effort, Fitted, ModelError, Shared, held_out_gain, is_unresolved};
 
 use crate::candidates::{Candidate, Search, accepts, white_gain};
-use crate::rank::worth;
+use crate::rank::{schwarz_penalty, worth};
 
 /// A look-alike in the place of an effect.
 pub(crate) struct Replacement {
@@ -163,7 +163,7 @@ impl Search<'_> {
             fitted,
             ..taken.clone()
         };
-        let of_residuals = white_gain.min(robust_gain) - more * candidate.fitted.count.max(2.0).ln();
+        let of_residuals = white_gain.min(robust_gain) - schwarz_penalty(more, candidate.fitted.count);
         let turn_phases = [&taken.effect, other].iter().all(|effect| effect.about().turns_phases);
         let of_readings =
             turn_phases.then(|| self.likelihood_advantage(current, &candidate.fitted, of_residuals, more));

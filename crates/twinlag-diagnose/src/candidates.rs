@@ -14,7 +14,7 @@ use twinlag_optimise::{End, Scale, Variable};
 
 use crate::grade::Reason;
 use crate::long::is_long;
-use crate::rank::{Kind, Score, threshold};
+use crate::rank::{Kind, Score, schwarz_penalty, threshold};
 
 /// Margin of a logarithm from its bound, and of a number as a share of its range, within which a
 /// parameter is on its bound.
@@ -331,7 +331,7 @@ impl<'a> Search<'a> {
             Some((gain.max(looked.white_gain).max(looked.robust_gain), looked))
         })?;
         let (noise, mut mean): (Vec<_>, Vec<_>) = looked.into_iter().flatten().partition(|(_, c)| c.effect.is_noise());
-        let unshared = |c: &Candidate| c.white_gain - c.added as f64 * c.fitted.count.max(2.0).ln();
+        let unshared = |c: &Candidate| c.white_gain - schwarz_penalty(c.added as f64, c.fitted.count);
         mean.sort_by(|(_, a), (_, b)| unshared(b).total_cmp(&unshared(a)));
         mean.truncate(self.policy.most_fitted_candidates);
         let mut finished = Vec::new();

@@ -4,7 +4,7 @@
 //! imply, finds the effect in [`Identifier::ALL`] that explains it, adds it, repeats, and reports
 //! errors before and after on blocks of the record that took no part in choosing or fitting; or it says
 //! that nothing is missing, or that something is and no known effect accounts for it. [`fit_with`]
-//! puts effects that are known already into the model.
+//! puts effects that are known already into the model, and [`fit_again_with`] begins with them.
 //!
 //! The crate takes readings, not files, and knows no file format: for logger files,
 //! characterisations and reports take `twinlag`; for the two-lag model alone, and other costs,

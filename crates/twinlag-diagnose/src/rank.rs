@@ -50,9 +50,8 @@ pub(crate) struct Score {
 }
 
 impl Score {
-    /// Schwarz's penalty.
     fn penalty(&self) -> f64 {
-        self.added as f64 * self.count.max(2.0).ln()
+        schwarz_penalty(self.added as f64, self.count)
     }
 
     /// Deviance saved beyond the penalty, if the noise is white.
@@ -63,7 +62,7 @@ impl Score {
     /// Deviance saved beyond the penalty for as many residuals as it was found in: what a candidate is worth by itself. A line counts by
     /// its share only against others.
     fn alone(&self) -> f64 {
-        self.white_gain - self.added as f64 * (self.count / self.share).max(2.0).ln()
+        self.white_gain - schwarz_penalty(self.added as f64, self.count / self.share)
     }
 
     /// Deviance saved beyond the penalty, whatever the noise.
@@ -80,6 +79,11 @@ impl Score {
 pub(crate) fn threshold(added: usize, p: f64) -> f64 {
     let chi2 = ChiSquared::new(added.max(1) as f64).expect("a positive number");
     chi2.inverse_cdf(1.0 - p)
+}
+
+/// Deviance by which so many parameters are expected to be better than none in a fit of `count` residuals (Schwarz 1978).
+pub(crate) fn schwarz_penalty(parameters: f64, count: f64) -> f64 {
+    parameters * count.max(2.0).ln()
 }
 
 /// The deviance that `added` parameters must save, by chance and by penalty, to be worth having in

@@ -5,44 +5,51 @@
 //! of two models that turn phases differ by chance as well, the more the less their residuals agree. The likelihood of the readings with
 //! the gas as one process, its spectrum learned from them, has no such term: where the gas is not, it does not depend on the sensors.
 
+use rayon::prelude::*;
 use twinlag_compensate::{Form, learn_quickly, reconstruct};
-use twinlag_model::{Extended, Fitted, Observations, Policy, held_out_gain};
+use twinlag_model::{Extended, Fitted, Observations, Policy, energy_difference_std, held_out_gain};
 
 use crate::candidates::{Candidate, Search};
-use crate::rank::threshold;
+use crate::rank::{schwarz_penalty, threshold};
+use crate::transfer::EffectInChannel;
 
-/// Standard deviations of the difference of two energies within which chance may have made it.
+/// Standard deviations beyond a tie within which chance may have made the deviance between two effects that turn phases: three, once in 370.
 const CHANCE_STANDARD_DEVIATIONS: f64 = 3.0;
-/// Most samples by which the residuals of two models may be apart: what each is centred on, and a delay between the channels.
-const MAX_SHIFT_SAMPLES: usize = 16;
 
 impl Search<'_> {
-    /// The candidate that makes the readings most probable, among the one that was accepted and its rivals: those that turn phases as it
-    /// does and have so nearly its gain that chance may have chosen between them. With it come those that explain the record as well.
+    /// The candidate under which the readings are most probable: the accepted one, or a rival that turns phases too and whose gain is no
+    /// further from its than chance may make it. With those within a tie of it.
     ///
-    /// - `ties`: those that do by their gains
+    /// - `ties`: those of the accepted one by their gains
     pub(crate) fn by_likelihood(
         &self,
         current: &Fitted,
         first: Candidate,
-        ties: Vec<Candidate>,
+        mut ties: Vec<Candidate>,
         all: &[Candidate],
     ) -> (Candidate, Vec<Candidate>) {
         let rivals = self.rivals(current, &first, all);
         if rivals.is_empty() {
             return (first, ties);
         }
-        let judged = std::iter::once(&first).chain(&rivals).map(|candidate| {
+        let score = |candidate: &Candidate| {
             let likelihood = log_likelihood(&candidate.fitted, self.observations)?;
-            Some((2.0 * likelihood - penalty(candidate.added as f64, &candidate.fitted), candidate.clone()))
-        });
-        // What has no such likelihood is judged without.
-        let Some(mut judged) = judged.collect::<Option<Vec<_>>>() else { return (first, ties) };
-        judged.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-        let (most, best) = judged.remove(0);
-        let tied = judged.into_iter().filter(|(deviance, _)| most - deviance < self.policy.tie_deviance);
-        let others = ties.into_iter().filter(|tie| !tie.effect.about().turns_phases);
-        (best, others.chain(tied.map(|(_, tie)| tie)).collect())
+            Some(2.0 * likelihood - schwarz_penalty(candidate.added as f64, candidate.fitted.count))
+        };
+        let scored = std::iter::once(first.clone()).chain(rivals).collect::<Vec<_>>().into_par_iter();
+        let mut scored: Vec<_> = scored.map(|candidate| (score(&candidate), candidate)).collect();
+        // What has no such likelihood explains the record as well as its gain says.
+        let Some(of_first) = scored[0].0 else { return (first, ties) };
+        let best = scored.iter().filter_map(|(score, _)| *score).fold(of_first, f64::max);
+        let at = scored.iter().position(|(score, _)| *score == Some(best)).unwrap_or(0);
+        let (_, chosen) = scored.remove(at);
+        let is_judged =
+            |tie: &Candidate| scored.iter().any(|(score, other)| score.is_some() && seat(other) == seat(tie));
+        ties.retain(|tie| !is_judged(tie));
+        let is_tied = |score: &Option<f64>| score.is_some_and(|score| best - score < self.policy.tie_deviance);
+        ties.extend(scored.into_iter().filter(|(score, _)| is_tied(score)).map(|(_, tie)| tie));
+        ties.retain(|tie| seat(tie) != seat(&chosen));
+        (chosen, ties)
     }
 
     /// The candidates that could stand in the place of `first`, which turns phases, and between which and it chance may have chosen.
@@ -51,13 +58,14 @@ impl Search<'_> {
         if !turns_phases(first) {
             return Vec::new();
         }
-        let of_first = first.score(current, self.policy);
+        let white = |candidate: &Candidate| candidate.score(current, self.policy);
+        let of_first = white(first).white();
         let is_rival = |other: &&Candidate| {
-            let score = other.score(current, self.policy);
-            score.seat != of_first.seat
+            let score = white(other);
+            seat(other) != seat(first)
                 && score.is_sound
                 && score.white() > 0.0
-                && self.may_be_chance(&first.fitted, &other.fitted, of_first.white() - score.white())
+                && self.may_be_chance(&first.fitted, &other.fitted, of_first - score.white())
                 && self.has_size(&other.fitted, current.model.effects.len())
         };
         let held_out = |other: &Candidate| {
@@ -83,42 +91,21 @@ impl Search<'_> {
         }
         let (before, after) =
             rayon::join(|| log_likelihood(fitted, self.observations), || log_likelihood(other, self.observations));
-        Some(2.0 * (after? - before?) - penalty(more, other))
+        Some(2.0 * (after? - before?) - schwarz_penalty(more, other.count))
     }
 
-    /// Whether chance may have made the deviance between two models that leave hardly more than noise. Of so many residuals `N` with the
-    /// correlation `ρ` between both models the energies differ with the variance `4 N (1 − ρ²)`; and a tie is no evidence in any case.
+    /// Whether chance may have made the deviance between two models that leave hardly more than noise; a tie is no evidence in any case.
     fn may_be_chance(&self, one: &Fitted, other: &Fitted, deviance: f64) -> bool {
         if one.mean_energy().max(other.mean_energy()) > self.policy.incomplete_energy {
             return false;
         }
-        let apart = 1.0 - self.residual_correlation(one, other).powi(2);
-        let std = 2.0 * (one.count * apart).max(0.0).sqrt();
+        let std = energy_difference_std(one, other, self.observations, self.selection);
         deviance.abs() < self.policy.tie_deviance + CHANCE_STANDARD_DEVIATIONS * std
-    }
-
-    /// The correlation between the residuals of two models, each at its own place among the samples.
-    fn residual_correlation(&self, one: &Fitted, other: &Fitted) -> f64 {
-        let [a, b] = [one, other].map(|fitted| {
-            let evaluation = fitted.model.evaluate(&fitted.theta, self.observations);
-            let mut by_sample = vec![0.0; self.observations.samples()];
-            for (residual, sample) in evaluation.residual.iter().zip(evaluation.sample()) {
-                if self.selection.holds(sample) {
-                    by_sample[sample] = *residual;
-                }
-            }
-            by_sample
-        });
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let energy = (dot(&a, &a) * dot(&b, &b)).sqrt();
-        let shifted = |by: usize| dot(&a[by.min(a.len())..], &b).max(dot(&a, &b[by.min(b.len())..]));
-        (0..=MAX_SHIFT_SAMPLES).map(|by| shifted(by) / energy).fold(0.0, f64::max)
     }
 }
 
-/// Schwarz's penalty of so many parameters.
-fn penalty(parameters: f64, fitted: &Fitted) -> f64 {
-    parameters * fitted.count.max(2.0).ln()
+fn seat(candidate: &Candidate) -> EffectInChannel {
+    (candidate.effect.identifier(), candidate.effect.channel())
 }
 
 /// Whether the candidate makes the readings more probable than `without` does, and by more than
@@ -143,7 +130,8 @@ pub(crate) fn is_confirmed(
 /// all of them, each with a gas of its own.
 fn log_likelihood(fitted: &Fitted, observations: &Observations) -> Option<f64> {
     let members = observations.members();
-    members.iter().map(|member| of_one_record(fitted, &observations.of_member(member.number))).sum()
+    let of_each = members.iter().map(|member| of_one_record(fitted, &observations.of_member(member.number)));
+    of_each.sum::<Option<f64>>().filter(|likelihood| likelihood.is_finite())
 }
 
 fn of_one_record(fitted: &Fitted, observations: &Observations) -> Option<f64> {

@@ -20,8 +20,9 @@ use crate::variables::{Arranged, Variable, arrange, period_s};
 /// What a file begins with: its mark, and the version of its header, whose length comes next.
 const MAGIC_BYTES: usize = 8;
 const MAJOR_VERSION_AT: usize = 6;
-/// Limits of a header. NumPy reads no more than 10 000 bytes unless asked to, and each record within a record takes two brackets.
-const MAX_HEADER_BYTES: usize = 1 << 20;
+/// Limits of a header. NumPy reads no more than 10 000 bytes unless asked to: six times that. Each record within a record takes two
+/// brackets.
+const MAX_HEADER_BYTES: usize = 1 << 16;
 const MAX_BRACKET_DEPTH: usize = 12;
 
 struct Numpy {
@@ -120,7 +121,7 @@ impl<R: Read> Read for Counted<R> {
     }
 }
 
-/// Reads the header. Reading brackets within brackets takes the library twice as long for each: forty keep it busy for hours.
+/// Reads the header. The library takes twice as long for each bracket within brackets.
 fn header(reader: &mut impl Read) -> Result<NpyHeader, Fault> {
     let damaged = |error| Fault::damaged_at(0, "the header of an array", error);
     let mut head = Vec::new();
@@ -141,11 +142,15 @@ fn header(reader: &mut impl Read) -> Result<NpyHeader, Fault> {
     NpyHeader::from_reader(&head[..]).map_err(|error| damaged(error.to_string()))
 }
 
-/// How many brackets are open at once, at most; those in names are none.
+/// How many brackets are open at once, at most; those in names do not count.
 fn bracket_depth(text: &[u8]) -> usize {
     let (mut quote, mut open, mut deepest) = (None, 0_usize, 0);
-    for &byte in text {
+    let mut bytes = text.iter();
+    while let Some(&byte) = bytes.next() {
         match (quote, byte) {
+            (Some(_), b'\\') => {
+                bytes.next();
+            }
             (Some(begun), _) => quote = Some(begun).filter(|begun| *begun != byte),
             (None, b'\'' | b'"') => quote = Some(byte),
             (None, b'(' | b'[' | b'{') => open += 1,

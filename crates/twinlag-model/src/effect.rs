@@ -200,9 +200,9 @@ pub trait Effect: Send + Sync {
         Vec::new()
     }
 
-    /// Which of its parameters may change places with the time constant of its sensor, the model being the same; the time constant is
-    /// the larger by convention. `None` if there is no such parameter.
-    fn interchangeable(&self) -> Option<usize> {
+    /// The parameter that is a lag in series with the time constant of its sensor, by its place: the model depends on their sum and product
+    /// alone. The time constant is the larger. `None` if there is none.
+    fn series_lag(&self) -> Option<usize> {
         None
     }
 

@@ -100,9 +100,9 @@ impl Fitted {
     /// This fit with parameters in their conventional order, where the model is the same for several.
     #[must_use]
     pub fn in_order(mut self) -> Self {
-        for LagPair { larger, smaller } in LagPair::each(&self.model) {
-            if self.theta[larger] < self.theta[smaller] {
-                self.theta.swap(larger, smaller);
+        for LagPair { time_constant, second } in LagPair::each(&self.model) {
+            if self.theta[time_constant] < self.theta[second] {
+                self.theta.swap(time_constant, second);
             }
         }
         self.report.x.clone_from(&self.theta);
@@ -303,7 +303,8 @@ impl Model {
     }
 
     /// Inverse of half the second derivatives of the energy; of the products of first ones where those are not positive
-    /// definite. Of two lags of one sensor they are those by their sum and product.
+    /// definite. Two lags of a sensor count by their sum and product
+    /// ([`LagPair::without_slope`]).
     pub(crate) fn curvature(
         &self,
         theta: &[f64],
@@ -312,7 +313,7 @@ impl Model {
         normal: &NormalEquations,
     ) -> Option<Vec<Vec<f64>>> {
         let mut second = self.second_derivatives(theta, observations, selection, normal, &[]);
-        LagPair::each(self).for_each(|pair| pair.straighten(&mut second, &normal.slope, theta));
+        LagPair::each(self).for_each(|pair| pair.without_slope(&mut second, &normal.slope, theta));
         dense::inverse(&second).or_else(|| dense::inverse(&normal.products))
     }
 }

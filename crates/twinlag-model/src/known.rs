@@ -46,11 +46,11 @@ pub fn fit_with(
     settings: &Settings,
     effects: &[KnownEffect],
 ) -> Result<KnownFit, ModelError> {
-    Ok(Known::of(observations, settings, effects, Numbers::Held)?.summarised())
+    Ok(Known::of(observations, settings, effects, KnownNumbers::Held)?.summarised())
 }
 
-/// As [`fit_with`], of the record that `effects` were found in: a fit of all their numbers, noise aside, begins with those that are known, so
-/// that the intervals of the time constants cover their uncertainty.
+/// As [`fit_with`], for the record that `effects` were found in: the fit begins at their numbers and moves all but those of noise, so that
+/// the intervals of the time constants cover them.
 ///
 /// # Errors
 /// As [`fit_with`].
@@ -59,13 +59,14 @@ pub fn fit_again_with(
     settings: &Settings,
     effects: &[KnownEffect],
 ) -> Result<KnownFit, ModelError> {
-    let KnownFit { fit, .. } = Known::of(observations, settings, effects, Numbers::Fitted)?.summarised();
-    Ok(KnownFit { fit, fitted_again: effects.iter().map(|known| known.effect).collect() })
+    let KnownFit { fit, .. } = Known::of(observations, settings, effects, KnownNumbers::Fitted)?.summarised();
+    let is_fitted = |known: &&KnownEffect| !known.effect.is_noise() && !known.effect.about().is_defect;
+    Ok(KnownFit { fit, fitted_again: effects.iter().filter(is_fitted).map(|known| known.effect).collect() })
 }
 
 /// What is done with the numbers of effects that are known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Numbers {
+pub(crate) enum KnownNumbers {
     /// They stay as they are, but for those that belong to a record.
     Held,
     /// A fit begins with them.
@@ -90,7 +91,7 @@ impl Known {
         observations: &Observations,
         settings: &Settings,
         effects: &[KnownEffect],
-        numbers: Numbers,
+        numbers: KnownNumbers,
     ) -> Result<Self, ModelError> {
         let mut prepared = Prepared::new(observations, settings)?;
         // Nothing is searched for that blocks would have to judge.
@@ -112,7 +113,7 @@ impl Known {
             for parameter in effect.parameters() {
                 check(known, parameter)?;
             }
-            if effect.is_of_the_record() {
+            if effect.is_of_the_record() && numbers == KnownNumbers::Held {
                 rest.extend(effect.starts().into_iter().next().unwrap_or_default());
                 fitted_again.push(known.effect);
             } else {
@@ -126,10 +127,10 @@ impl Known {
         let fit_again =
             |from: &Fitted| from.model.fit(&from.theta, &prepared.observations, &prepared.everything, Effort::Look);
         let mut fitted = fit(&prepared, &model).in_own_gas(&prepared.observations, fit_again);
-        if numbers == Numbers::Fitted {
+        if numbers == KnownNumbers::Fitted {
             fitted.model.is_frozen = false;
             let Prepared { observations, everything, .. } = &prepared;
-            fitted = fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order();
+            fitted = fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish);
         }
         model = fitted.model.clone();
         let has_spikes = settings.effects.contains(&Identifier::SPIKES) && prepared.mask_spikes(&fitted);
@@ -153,7 +154,7 @@ impl Known {
         if corrected.is_mismatch_bias_removed && is_noise_left() {
             fitted = corrected;
         }
-        Ok(Self { prepared, fitted, fitted_again })
+        Ok(Self { prepared, fitted: fitted.in_order(), fitted_again })
     }
 }
 

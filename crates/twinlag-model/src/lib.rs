@@ -4,6 +4,7 @@
 mod between;
 mod blocks;
 mod chain;
+mod chance;
 mod correlation;
 mod cost;
 mod defects;
@@ -51,6 +52,7 @@ mod weighting;
 mod whitening;
 
 pub use between::{Between, BetweenRecords, Contradicted, OwnValue};
+pub use chance::energy_difference_std;
 pub use cost::Linearised;
 pub use defects::{ChannelNoise, levels, line_channel, lines};
 pub use departure::Departure;

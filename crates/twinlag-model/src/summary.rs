@@ -4,7 +4,7 @@ use twinlag_cross_relation::{CHI2_95, ResidualTest, Z_975, log_normal_interval_9
 
 use crate::between::between;
 use crate::correlation::{autocorrelation, filtered};
-use crate::cost::Linearised;
+use crate::cost::{Linearised, ResidualCost};
 use crate::defects::ChannelNoise;
 use crate::dense;
 use crate::extended::Extended;
@@ -89,7 +89,8 @@ fn is_correlated(observations: &Observations, channel: usize) -> bool {
 
 /// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first
 /// ones, for white noise or, where the residual is not that, with its own autocorrelation; and that of a mismatch of the gas, of which
-/// the record does not say at which sensor it is. Two lags of one sensor may be equal in it.
+/// the record does not say at which sensor it is. Of two lags of one sensor it is
+/// that of their sum and of the square of their difference, so that they may be equal.
 pub fn covariance(
     fitted: &Fitted,
     observations: &Observations,
@@ -102,7 +103,8 @@ pub fn covariance(
     let inverse = model.curvature(theta, observations, selection, &normal)?;
     let white = normal.slope_covariance;
     let middle = if by_residual {
-        let mut coloured = coloured(&model.linearised(theta, observations, selection));
+        let residual = ResidualCost::new(model, &fitted.theta, observations, selection).residuals(&fitted.theta);
+        let mut coloured = coloured(&model.linearised(theta, observations, selection), &residual);
         // No less than white noise alone.
         for (a, row) in coloured.iter_mut().enumerate() {
             row[a] = row[a].max(white[a][a]);
@@ -113,16 +115,18 @@ pub fn covariance(
     };
     let mut out = dense::product(&dense::product(&inverse, &middle), &inverse);
     apart.mismatch_covariance(observations, selection).iter().for_each(|other| dense::add(&mut out, other));
-    LagPair::each(model).for_each(|pair| pair.carry(&mut out, theta, &fitted.theta));
+    LagPair::each(model).for_each(|pair| pair.covariance_at(&mut out, theta, &fitted.theta));
     Some(out)
 }
 
 /// Covariance of half the first derivatives of the energy for noise that is correlated as the residual is: products of the columns
 /// with themselves, each filtered by its autocorrelation, under Bartlett's window over the lags in which it remembers.
-fn coloured(lin: &Linearised) -> Vec<Vec<f64>> {
+///
+/// - `residual`: where the fit is, which need not be where it was linearised
+fn coloured(lin: &Linearised, residual: &[f64]) -> Vec<Vec<f64>> {
     let n = lin.samples.len();
     let lags = (2.0 * (n as f64).sqrt()) as usize;
-    let mut kernel = autocorrelation(&lin.residual[..n], lags.min(n / 4));
+    let mut kernel = autocorrelation(residual, lags.min(n / 4));
     kernel.iter_mut().enumerate().for_each(|(lag, c)| *c *= 1.0 - lag as f64 / (lags + 1) as f64);
     // A column of another record is zero throughout.
     let is_zero = |column: &[f64]| column.iter().all(|value| *value == 0.0);

@@ -19,7 +19,7 @@ use crate::effect::{Shared, varying};
 use crate::error::ModelError;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::ModelFit;
-use crate::known::{Known, Numbers};
+use crate::known::{Known, KnownNumbers};
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::prepare::Prepared;
@@ -121,7 +121,7 @@ pub fn track(
 ) -> Result<Track, ModelError> {
     let others: Vec<KnownEffect> =
         effects.iter().filter(|e| !e.effect.about().changes_time_constants).cloned().collect();
-    let Known { prepared, fitted: constant, .. } = Known::of(observations, settings, &others, Numbers::Held)?;
+    let Known { prepared, fitted: constant, .. } = Known::of(observations, settings, &others, KnownNumbers::Held)?;
     let has_delay = constant.model.parameters().any(|p| p.is_lateness);
     let selection = if has_delay { prepared.everything.clone() } else { prepared.without_delay() };
     let constant = constant.model.fit(&constant.theta, &prepared.observations, &selection, Effort::Finish);

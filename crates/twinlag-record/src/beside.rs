@@ -108,8 +108,8 @@ fn falls_often(values: &[f64]) -> bool {
     falls > 1 + values.len() / MIN_ROWS_OF_TURN
 }
 
-/// Refuses a time that was guessed where a clock beside it shows another one, in the ratio of two units; notes where one differs otherwise, from
-/// the period of a record without a time column as well.
+/// Refuses a guessed time that a clock beside it contradicts by the ratio of two units, and notes where they differ otherwise. Of rows counted
+/// by a period it notes alone.
 ///
 /// - `unit`: the unit that the caller chose
 /// - `period_s`: that of rows without a time

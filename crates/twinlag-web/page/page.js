@@ -318,8 +318,9 @@
 
   // NaN where it is no time.
   function periodSeconds() {
-    const [, number, unit] = decimal("period").match(/^(\S*?)\s*(s|ms|us|µs)?$/u) ?? [];
-    return number ? Number(number) * { s: 1, ms: 1e-3, us: 1e-6, µs: 1e-6 }[unit ?? "s"] : NaN;
+    const [, number, unit] = decimal("period").match(/^(\S*?)\s*(s|ms|us|\u00b5s|\u03bcs)?$/u) ?? [];
+    const perSecond = { s: 1, ms: 1e3 }[unit ?? "s"] ?? 1e6;
+    return number ? Number(number) / perSecond : NaN;
   }
 
   function checkPeriod() {

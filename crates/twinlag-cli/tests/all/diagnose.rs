@@ -302,8 +302,9 @@ fn what_is_unknown_has_the_names_of_a_characterisation() {
     }
 }
 
-/// The record that made the model gives with it the time constants that the diagnosis gave, and the same intervals, since the numbers of the
-/// effect are fitted again: they agree to a tenth of a standard error, which is where fits stop, and the standard errors to a hundredth.
+/// The record that made the model gives with it the time constants that the diagnosis gave, and their standard errors, since the numbers of
+/// the effect are fitted again: they agree to a tenth of a standard error, which is where fits stop, and the errors to a hundredth. Intervals
+/// of the diagnosis also cover other causes, which the condition names.
 #[test]
 fn a_saved_model_gives_its_own_record_the_same_time_constants() {
     let bench = offset("same");

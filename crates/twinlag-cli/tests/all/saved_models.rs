@@ -86,14 +86,17 @@ fn a_model_says_what_it_was_found_in_and_how_well() {
     assert_eq!(data["sha256"].as_str().map(str::len), Some(64));
 }
 
-/// On its own record a model is fitted again, and is as sure as the diagnosis was; on another one its numbers are taken as exact, and the
-/// sensors must be those.
+/// On its own record a model is fitted again, and rests on what the diagnosis did; on another one its numbers are taken as exact, and the
+/// sensors must be those. Along the record it is held where it was, in its own too.
 #[test]
 fn numbers_found_with_a_model_are_conditional_on_it() {
     let (bench, _) = saved("conditional");
     let own = bench.characterise("run.csv", &["--model", "model.json"]).status(&["ok"]);
     assert_eq!(remarks(&own), Vec::<String>::new());
     assert!(condition(&own).starts_with("it follows from the time constants in the model: "), "{own:#}");
+    let along = bench.run(&["track", "run.csv", "--model", "model.json", "--out", "tau.csv", "--json", "--quiet"]);
+    let along: Value = serde_json::from_str(&along.stdout).expect("JSON");
+    assert!(condition(&along["final"]).contains("right if the sensors are those of run.csv"), "{along:#}");
     hotter(&bench, [0.5, 0.5]);
     let other = bench.characterise("other.csv", &["--model", "model.json"]).status(&["ok"]);
     assert_eq!(remarks(&other), Vec::<String>::new());

@@ -196,7 +196,8 @@ fn a_drift_is_found() {
 }
 
 /// A second lag nearly as long as the first. Failed: the residuals alone, of which the energies differ by chance, made a delay of it that
-/// was `go`; and where both lags come out equal, a covariance that knew nothing of their difference gave them to 3 %.
+/// was `go`; and where both lags come out equal, a covariance that knew nothing of their difference gave them to 3 %. With a standard error of
+/// `q` of a tenth of a lag squared they would be within 44 %; the ends are held to twice that.
 #[test]
 fn two_lags_that_may_be_equal_are_no_delay() {
     let lags_s = [0.15, 0.12];
@@ -213,7 +214,11 @@ fn two_lags_that_may_be_equal_are_no_delay() {
     let second = d.effects[0].parameters[0].interval_95.expect("it is determined");
     let first = d.last.time_constants[0].interval_95_s.expect("it is determined");
     for (lag_s, [low_s, high_s]) in lags_s.into_iter().zip([first, second]) {
-        assert!(low_s < lag_s && lag_s < high_s, "{lag_s} s in [{low_s}, {high_s}]: {}", told(&d));
+        assert!(
+            low_s < lag_s && lag_s < high_s && high_s < 1.88 * lag_s,
+            "{lag_s} s in [{low_s}, {high_s}]: {}",
+            told(&d)
+        );
     }
 }
 

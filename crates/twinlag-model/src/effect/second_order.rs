@@ -55,7 +55,7 @@ impl Effect for SecondOrder {
         plant.sensors[self.sensor].second_tau_s = Some(values[0]);
     }
 
-    fn interchangeable(&self) -> Option<usize> {
+    fn series_lag(&self) -> Option<usize> {
         Some(0)
     }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::fit::Fitted;
-use crate::known::{Known, Numbers};
+use crate::known::{Known, KnownNumbers};
 use crate::observations::{Observations, Stretch};
 use crate::prepare::Prepared;
 use crate::selection::Selection;
@@ -60,7 +60,7 @@ impl Fixture {
         let observations = observations(samples, NOISE_K, factor);
         let settings = Settings { noise_std_k: Some([NOISE_K; 2]), ..Settings::default() };
         let Known { prepared, fitted, .. } =
-            Known::of(&observations, &settings, &[], Numbers::Held).expect("a sound record");
+            Known::of(&observations, &settings, &[], KnownNumbers::Held).expect("a sound record");
         let selection = prepared.everything.clone();
         let time_s = observations.stretches[0].time_s.iter().collect();
         Self { prepared, selection, time_s, constant: fitted }

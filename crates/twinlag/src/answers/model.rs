@@ -206,13 +206,10 @@ impl Model {
         let mut out: Vec<Reason> = self.incomplete().into_iter().collect();
         let held: Vec<&ModelEffect> =
             self.effects.iter().filter(|e| e.is_of_the_rig() && !fitted_again.contains(&e.effect)).collect();
-        if self.is_of(record) {
-            out.extend(self.of_its_time_constants());
-            return out;
-        }
         let source = self.found_in.as_ref().map(|data| data.source.clone());
         if held.is_empty() {
-            out.push(Reason::NothingInModel { source });
+            let of_its_own = || self.of_its_time_constants();
+            out.extend(if self.is_of(record) { of_its_own() } else { Some(Reason::NothingInModel { source }) });
             return out;
         }
         let no_go: Vec<String> =

@@ -1,4 +1,4 @@
-//! A record with the effects of a model that was found in another one.
+//! A record with the effects of a model: held where it was found in another one, and fitted again in its own.
 
 use twinlag_diagnose::{
     Basis, Circumstances, Identifier, ModelFit, Observations, Reason, Remark, Settings, excess, fit_again_with,
