@@ -16,8 +16,9 @@ use crate::error::Error;
 use crate::options::Options;
 use crate::rows::{Rows, settings_of};
 use crate::setting::Setting;
+use crate::verbs::characterise::judge_unseen;
 use crate::verbs::{characterise, following_both};
-use crate::watch::{UNWATCHED, Watch};
+use crate::watch::{Stop, UNWATCHED, Watch};
 
 /// Below this chance the ratio does not stay.
 const RATIO_CHANGES: f64 = 1e-3;
@@ -169,6 +170,13 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     let mut last = fitted.characterisation(status);
     last.model_remarks = reasons.iter().filter_map(Reason::caution).collect();
     let (change, coefficients) = if sensors.is_some() { name_of(found.change) } else { ("unknown", None) };
+    // Time constants that stay are those of two lags, which may hide what these may.
+    if change == "constant" && effects.is_empty() {
+        judge_unseen(&mut last, &observations, &options.characterise, &Stop::new(watch))?;
+        let constant = last.sensors.each_ref().map(|sensor| &sensor.judgement);
+        judgement = judgement.and_following(following_both(&record.channels, constant));
+        grades.iter_mut().for_each(|grade| *grade = (*grade).max(judgement.grade));
+    }
     Ok(Track {
         schema: Track::SCHEMA.into(),
         status,
