@@ -297,7 +297,8 @@ impl Rig {
     ///
     /// ```
     /// # use twinlag_signal::{Gas, Record, Rig, Sensor, Signal, Tone};
-    /// let gas = Gas::new(300.0, Signal::Sine(Tone::new(10.0, 2.0)));
+    /// let tone = Tone { amplitude_k: 10.0, frequency_hz: 2.0, phase_rad: 0.0 };
+    /// let gas = Gas::new(300.0, Signal::Sine(tone));
     /// let mut record = Record::new(1000, 0.01);
     /// record.settle_s = Some(1.0);
     /// record.oversampling = 4;
