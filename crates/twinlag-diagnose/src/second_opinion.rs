@@ -58,14 +58,13 @@ impl Search<'_> {
         if !turns_phases(first) {
             return Vec::new();
         }
-        let white = |candidate: &Candidate| candidate.score(current, self.policy);
-        let of_first = white(first).white();
+        let white_of_first = first.score(current, self.policy).white();
         let is_rival = |other: &&Candidate| {
-            let score = white(other);
+            let score = other.score(current, self.policy);
             seat(other) != seat(first)
                 && score.is_sound
                 && score.white() > 0.0
-                && self.may_be_chance(&first.fitted, &other.fitted, of_first - score.white())
+                && self.may_be_chance(&first.fitted, &other.fitted, white_of_first - score.white())
                 && self.has_size(&other.fitted, current.model.effects.len())
         };
         let held_out = |other: &Candidate| {

@@ -265,3 +265,17 @@ impl Opened for Numpy {
         Ok(loaded)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Brackets in names do not count, and a quote after a backslash does not end a name.
+    #[test]
+    fn brackets_count_outside_of_names() {
+        assert_eq!(bracket_depth(b"{'descr': [('a', '<f8', (2,))], 'shape': (3,)}"), 4);
+        assert_eq!(bracket_depth(b"['[[[', \"((\"]"), 1);
+        assert_eq!(bracket_depth(b"['\\'[[', []]"), 2);
+        assert_eq!(bracket_depth(b"['\\'', [[]]]"), 3);
+    }
+}

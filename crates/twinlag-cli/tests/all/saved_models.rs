@@ -205,3 +205,10 @@ fn what_a_model_does_not_explain_is_not_given() {
     assert_eq!(gas.code, 4, "{gas:#?}");
     assert!(!bench.has("gas.csv"), "{gas:#?}");
 }
+
+#[test]
+fn a_file_that_is_no_model_is_refused_for_what_it_is() {
+    let (bench, _) = saved("no-model");
+    let words = ["run.csv", "expected a model written by `twinlag diagnose --save`", "begins with {"];
+    bench.refuses(3, &["characterise", "run.csv", "--model", "run.csv"], &words);
+}

@@ -196,7 +196,7 @@ fn a_drift_is_found() {
 }
 
 /// A second lag nearly as long as the first. Failed: the residuals alone, of which the energies differ by chance, made a delay of it that
-/// was `go`; and where both lags come out equal, a covariance that knew nothing of their difference gave them to 3 %. With a standard error of
+/// was `go`; and where both lags come out equal, a covariance that knew nothing of their difference gave them as if it were known. With a standard error of
 /// `q` of a tenth of a lag squared they would be within 44 %; the ends are held to twice that.
 #[test]
 fn two_lags_that_may_be_equal_are_no_delay() {
