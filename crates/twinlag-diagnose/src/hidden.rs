@@ -13,7 +13,7 @@ use twinlag_model::{
 };
 
 use crate::candidates::{Candidate, Search};
-use crate::size::{Around, Lacking, Profile, least_size};
+use crate::size::{Around, Lacking, Posterior, Profile, least_size};
 
 /// Pieces of a longer record that are looked at for effects that two lags may hide, and the samples of each in the last look.
 /// What is resolved in them is in the whole; of what is not, they say more often that it may be there. Chosen: a second for the
@@ -38,8 +38,8 @@ pub fn pieces_of_long(samples: usize) -> Option<Vec<Range<usize>>> {
     (samples > PIECES * PIECE_SAMPLES).then(|| evenly_spread(samples, PIECES, PIECE_SAMPLES).map(piece).collect())
 }
 
-/// Effects that two lags may hide, for both time constants and their difference: those that are most probably there unseen,
-/// where all those that would move the number out of its interval are together more probable than the policy allows.
+/// Effects that two lags may hide, for both time constants and their difference: those that most probably are there unseen and
+/// move the number out of its interval, where that is together more probable than the policy allows.
 ///
 /// ```
 /// use twinlag_diagnose::{Observations, Settings, Stretch, unseen};
@@ -179,14 +179,35 @@ struct Hidden {
     effect: Identifier,
     /// Probability that it is there.
     probability: f64,
-    /// How far both time constants, their difference, and the parameters of effects would then be off.
-    shift: Vec<f64>,
+    shift: Shift,
+}
+
+/// How far both time constants, their difference, and the parameters of effects are off where an effect is there unseen.
+enum Shift {
+    /// In proportion to its size.
+    WithSize { for_each: Vec<f64>, size: Posterior },
+    /// As far as to where they were fitted with it.
+    Afar(Vec<f64>),
+    /// Nobody knows.
+    Any,
+}
+
+impl Shift {
+    /// Probability that number `i` is off by more than `distance`.
+    fn beyond(&self, i: usize, distance: f64) -> f64 {
+        match self {
+            Self::WithSize { for_each, .. } if for_each[i] == 0.0 => 0.0,
+            Self::WithSize { for_each, size } if for_each[i].is_finite() => size.beyond(distance / for_each[i].abs()),
+            Self::Afar(far) if far[i] <= distance => 0.0,
+            _ => 1.0,
+        }
+    }
 }
 
 impl Search<'_> {
     /// For both time constants, their difference, and each parameter of the effects of a model the effects that may be there
-    /// unseen and would move the number by more than half its interval: so many kinds, the likeliest first, that all others are
-    /// together no more probable than the policy allows.
+    /// unseen and move the number by more than half its interval: so many kinds, the likeliest first, that it is together no more
+    /// probable than the policy allows that others do.
     ///
     /// - `far`: effects that were fitted with quite other time constants, and not accepted
     /// - `half`: half the intervals; `None` of a number that has none
@@ -219,23 +240,23 @@ impl Search<'_> {
     }
 }
 
-/// For each number the kinds of effects that would move it by more than half its interval and without which all others that would
-/// are together no more probable than `most`.
+/// For each number the kinds of effects that may move it by more than half its interval and without which it is together no more
+/// probable than `most` that others do.
 fn decisive(hidden: &[Hidden], half: &[Option<f64>], most: f64) -> Vec<Vec<Identifier>> {
     let of = |(i, half): (usize, &Option<f64>)| {
-        let moves = |h: &&Hidden| half.is_some_and(|half| h.shift[i] > half);
-        too_probable(hidden.iter().filter(moves), most)
+        let moves = |h: &Hidden| half.map_or(0.0, |half| h.probability * h.shift.beyond(i, half));
+        too_probable(hidden.iter().map(|h| (h.effect, moves(h))), most)
     };
     half.iter().enumerate().map(of).collect()
 }
 
 /// Kinds of effects without which all others are together no more probable than `most`.
-fn too_probable<'h>(hidden: impl Iterator<Item = &'h Hidden>, most: f64) -> Vec<Identifier> {
+fn too_probable(hidden: impl Iterator<Item = (Identifier, f64)>, most: f64) -> Vec<Identifier> {
     let mut kinds: Vec<(Identifier, f64)> = Vec::new();
-    for Hidden { effect, probability, .. } in hidden {
-        match kinds.iter_mut().find(|(kind, _)| kind == effect) {
+    for (effect, probability) in hidden {
+        match kinds.iter_mut().find(|(kind, _)| *kind == effect) {
             Some((_, sum)) => *sum += probability,
-            None => kinds.push((*effect, *probability)),
+            None => kinds.push((effect, probability)),
         }
     }
     kinds.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -251,12 +272,9 @@ fn unseen_near<'a>(current: &'a Fitted, lacking: &'a Lacking, prior: f64) -> imp
     let hidden = move |along: &Option<Profile>, usual: f64| {
         let size = &effect.parameters()[*main];
         let is_positive = least_size(size) - size.variable.lower < NEGLIGIBLE_SHARE * usual;
-        // Where nothing is known of it, it may move everything.
-        let (bayes_factor, shift) = along.as_ref().map_or((1.0, vec![f64::INFINITY; count + 1]), |along| {
-            let posterior = along.posterior(usual, is_positive);
-            let shift = with_difference(&along.follow[..count]);
-            let moved = |x: &f64| Some((x * posterior.rms).abs()).filter(|x| !x.is_nan()).unwrap_or(f64::INFINITY);
-            (posterior.bayes_factor, shift.iter().map(moved).collect())
+        let (bayes_factor, shift) = along.as_ref().map_or((1.0, Shift::Any), |along| {
+            let size = along.posterior(usual, is_positive);
+            (size.bayes_factor, Shift::WithSize { for_each: with_difference(&along.follow[..count]), size })
         });
         Hidden { effect: effect.identifier(), probability: probability_of(prior * bayes_factor), shift }
     };
@@ -281,11 +299,34 @@ fn unseen_afar(current: &Fitted, candidate: &Candidate, prior: f64) -> Option<Hi
     let error = fitted.theta[current.theta.len() + main].abs() / gain.sqrt();
     let odds = prior * error / error.hypot(usual) * (0.5 * gain).exp();
     let (here, there) = (with_difference(&current.theta), with_difference(&fitted.theta[..current.theta.len()]));
-    let shift = here.iter().zip(&there).map(|(here, there)| (there - here).abs()).collect();
-    Some(Hidden { effect: effect.identifier(), probability: probability_of(odds), shift })
+    let far = here.iter().zip(&there).map(|(here, there)| (there - here).abs()).collect();
+    Some(Hidden { effect: effect.identifier(), probability: probability_of(odds), shift: Shift::Afar(far) })
 }
 
 /// Both time constants, their difference, and the parameters of effects, from the parameters of a model.
 fn with_difference(theta: &[f64]) -> Vec<f64> {
     [&[theta[0], theta[1], theta[1] - theta[0]], &theta[2..]].concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A size that is normal about none is beyond one standard deviation in 32 of 100 cases, beyond half of one in 62. Of an effect
+    /// that is there in one of ten, the first is below the one in twenty that is allowed and the second above.
+    #[test]
+    fn what_seldom_moves_a_number_out_of_its_interval_is_no_condition() {
+        let hidden = |for_each: Vec<f64>| {
+            let size = Profile::unseen().posterior(1.0, false);
+            Hidden { effect: Identifier::DELAY, probability: 0.1, shift: Shift::WithSize { for_each, size } }
+        };
+        let half = [Some(1.0), Some(0.5), None];
+        let lists = decisive(&[hidden(vec![1.0; 3])], &half, 0.05);
+        assert_eq!(lists, [vec![], vec![Identifier::DELAY], vec![]]);
+        // An effect that does not move a number, or opposite to it, and one of which nothing is known.
+        let lists = decisive(&[hidden(vec![0.0, -1.0, 1.0])], &[Some(0.0), Some(0.5), Some(0.5)], 0.05);
+        assert_eq!(lists, [vec![], vec![Identifier::DELAY], vec![Identifier::DELAY]]);
+        let any = Hidden { effect: Identifier::DELAY, probability: 0.1, shift: Shift::Any };
+        assert_eq!(decisive(&[any], &half, 0.05)[0], [Identifier::DELAY]);
+    }
 }

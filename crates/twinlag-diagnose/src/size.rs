@@ -5,9 +5,9 @@
 //! nothing of the parameters, and in loud records are most of it. The variance of the estimate `s − g/h` is `b/h²`, where `b` is the
 //! variance of `g` under white noise.
 
-use std::f64::consts::{SQRT_2, TAU};
+use std::f64::consts::TAU;
 
-use statrs::distribution::{Continuous, ContinuousCDF, Normal};
+use statrs::distribution::{ContinuousCDF, Normal};
 use twinlag_model::{Beside, Effect, Fitted, Linearised, ModelError, NormalEquations, Parameter, Shared, dense};
 
 use crate::candidates::Search;
@@ -194,6 +194,12 @@ impl Profile {
         })
     }
 
+    /// That of a record which says nothing of the size.
+    #[cfg(test)]
+    pub(crate) fn unseen() -> Self {
+        Self { slope: 0.0, curvature: 0.0, slope_variance: 0.0, follow: Vec::new() }
+    }
+
     /// Variance of the estimated size; infinite where the energy has no minimum.
     pub(crate) fn variance(&self) -> f64 {
         if self.curvature > 0.0 { self.slope_variance / self.curvature.powi(2) } else { f64::INFINITY }
@@ -208,19 +214,15 @@ impl Profile {
         let weight = if is_seen { self.curvature / self.slope_variance } else { 0.0 };
         let precision = weight * self.curvature + usual.powi(-2);
         let mean = -weight * self.slope / precision;
-        let (root, in_std) = (precision.sqrt(), mean * precision.sqrt());
-        let bayes_factor = (0.5 * in_std * in_std).exp() / (usual * root);
-        if !is_positive {
-            return Posterior { bayes_factor, rms: mean.hypot(root.recip()) };
-        }
-        if in_std < FAR_BELOW_ZERO {
+        let (std, in_std) = (precision.sqrt().recip(), mean * precision.sqrt());
+        if is_positive && in_std < FAR_BELOW_ZERO {
             let density = 1.0 / (in_std.abs() * TAU.sqrt());
-            return Posterior { bayes_factor: 2.0 * density / (usual * root), rms: SQRT_2 / (in_std.abs() * root) };
+            let sizes = Sizes::Exponential { mean: std / in_std.abs() };
+            return Posterior { bayes_factor: 2.0 * density * std / usual, sizes };
         }
-        let normal = Normal::standard();
-        let share = normal.cdf(in_std);
-        let square = (in_std * in_std + 1.0 + in_std * normal.pdf(in_std) / share).max(0.0);
-        Posterior { bayes_factor: 2.0 * share * bayes_factor, rms: square.sqrt() / root }
+        let factor = if is_positive { 2.0 * Normal::standard().cdf(in_std) } else { 1.0 };
+        let bayes_factor = factor * (0.5 * in_std * in_std).exp() * std / usual;
+        Posterior { bayes_factor, sizes: Sizes::Normal { mean, std, is_positive } }
     }
 }
 
@@ -228,8 +230,31 @@ impl Profile {
 pub(crate) struct Posterior {
     /// How much more probable the record is with an effect of such sizes than without one.
     pub(crate) bayes_factor: f64,
-    /// Root of the mean square of the size.
-    pub(crate) rms: f64,
+    sizes: Sizes,
+}
+
+/// How the size of an effect is distributed.
+enum Sizes {
+    /// Normally; of positive ones alone where these are known to be.
+    Normal { mean: f64, std: f64, is_positive: bool },
+    /// As the far tail of a normal.
+    Exponential { mean: f64 },
+}
+
+impl Posterior {
+    /// Probability that the size is further than `distance` from none.
+    pub(crate) fn beyond(&self, distance: f64) -> f64 {
+        let normal = Normal::standard();
+        match self.sizes {
+            Sizes::Exponential { mean } => (-distance / mean).exp(),
+            Sizes::Normal { mean, std, is_positive: true } => {
+                normal.cdf((mean - distance) / std) / normal.cdf(mean / std)
+            }
+            Sizes::Normal { mean, std, is_positive: false } => {
+                normal.cdf((mean - distance) / std) + normal.cdf((-mean - distance) / std)
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -245,21 +270,22 @@ mod tests {
         Profile { slope, curvature, slope_variance, follow: Vec::new() }
     }
 
-    /// Bayes factor and root mean square by a sum over sizes, of an estimate −g/h with variance b/h².
-    fn summed(usual: f64, is_positive: bool, [slope, curvature, slope_variance]: [f64; 3]) -> [f64; 2] {
+    /// Bayes factor, and the probability to be further than `distance` from none, by a sum over sizes, of an estimate −g/h with
+    /// variance b/h².
+    fn summed(usual: f64, is_positive: bool, [slope, curvature, slope_variance]: [f64; 3], distance: f64) -> [f64; 2] {
         let weight = curvature / slope_variance;
         let step = 1e-4 * usual;
         let first = if is_positive { 0 } else { -100_000 };
-        let (mut sum, mut square, mut prior) = (0.0, 0.0, 0.0);
+        let (mut sum, mut far, mut prior) = (0.0, 0.0, 0.0);
         for k in first..100_000 {
             let size = step * (f64::from(k) + 0.5);
             let before = (-0.5 * (size / usual).powi(2)).exp();
             let likelihood = (-weight * (slope * size + 0.5 * curvature * size * size)).exp();
             prior += before;
             sum += before * likelihood;
-            square += before * likelihood * size * size;
+            far += if size.abs() > distance { before * likelihood } else { 0.0 };
         }
-        [sum / prior, (square / sum).sqrt()]
+        [sum / prior, far / sum]
     }
 
     /// Sums over steps of a ten-thousandth of the usual size are exact to its square, far beyond the bound.
@@ -267,10 +293,12 @@ mod tests {
     fn posteriors_are_those_of_a_sum_over_sizes() {
         for is_positive in [false, true] {
             for energy in [[0.0, 1.0, 1.0], [-3.0, 2.0, 2.5], [2.0, 2.0, 4.0], [-0.5, 0.01, 0.02]] {
-                let got = profile(energy).posterior(0.7, is_positive);
-                let [factor, rms] = summed(0.7, is_positive, energy);
-                assert!((got.bayes_factor / factor - 1.0).abs() < 1e-6, "{energy:?} {is_positive}");
-                assert!((got.rms / rms - 1.0).abs() < 1e-6, "{energy:?} {is_positive}");
+                for distance in [0.0, 0.21, 0.7] {
+                    let got = profile(energy).posterior(0.7, is_positive);
+                    let [factor, far] = summed(0.7, is_positive, energy, distance);
+                    assert!((got.bayes_factor / factor - 1.0).abs() < 1e-6, "{energy:?} {is_positive}");
+                    assert!((got.beyond(distance) / far - 1.0).abs() < 1e-6, "{energy:?} {is_positive} {distance}");
+                }
             }
         }
     }
@@ -279,17 +307,21 @@ mod tests {
     #[test]
     fn a_positive_size_that_seems_negative_is_small_and_improbable() {
         let energy = [45.0, 2.0, 2.0];
-        let got = profile(energy).posterior(0.7, true);
-        let [factor, rms] = summed(0.7, true, energy);
-        assert!((got.bayes_factor / factor - 1.0).abs() < 6.2e-3 && (got.rms / rms - 1.0).abs() < 6.2e-3);
+        for distance in [0.0, 0.02] {
+            let got = profile(energy).posterior(0.7, true);
+            let [factor, far] = summed(0.7, true, energy, distance);
+            let [of_factor, of_far] = [got.bayes_factor / factor, got.beyond(distance) / far];
+            assert!((of_factor - 1.0).abs() < 6.2e-3 && (of_far - 1.0).abs() < 6.2e-3, "{of_factor} {of_far}");
+        }
     }
 
-    /// A record that says nothing leaves what was known before.
+    /// A record that says nothing leaves what was known before: one size of three is further from none than a standard deviation.
     #[test]
     fn nothing_seen_leaves_the_usual_size() {
+        let one_in_three = 2.0 * Normal::standard().cdf(-1.0);
         for is_positive in [false, true] {
             let nothing = profile([0.3, -1.0, 1.0]).posterior(2.0, is_positive);
-            assert!((nothing.bayes_factor - 1.0).abs() < 1e-12 && (nothing.rms - 2.0).abs() < 1e-12);
+            assert!((nothing.bayes_factor - 1.0).abs() < 1e-12 && (nothing.beyond(2.0) - one_in_three).abs() < 1e-12);
         }
     }
 

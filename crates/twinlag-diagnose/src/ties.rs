@@ -1,6 +1,6 @@
 //! What explains a record as well as what is named, and what the time constants are then.
 
-use twinlag_model::{Effort, Fitted, Identifier, ModelFit, Policy, Prepared, Value, covariance};
+use twinlag_model::{Effort, Fitted, Identifier, ModelFit, Policy, Prepared, TimeConstant, Value, covariance};
 use twinlag_optimise::Scale;
 
 use crate::candidates::effects_on_bounds;
@@ -135,20 +135,23 @@ impl Tie {
     }
 }
 
-/// Widens the intervals of both time constants and of their difference, so that they hold whichever of the tied effects is
+/// Widens the intervals of `numbers`, both time constants and their difference, so that they hold whichever of the tied effects is
 /// the right one; returns what to say of that, and with which effect alone, in its channel, each of them was right before.
 pub(crate) fn widen(
-    fit: &mut ModelFit,
+    numbers: [&mut TimeConstant; 3],
     ties: &[Tie],
     policy: &Policy,
 ) -> (Option<Remark>, [Option<EffectInChannel>; 3]) {
     let (mut effects, mut causes) = (Vec::new(), [None; 3]);
-    let [one, two] = &mut fit.time_constants;
-    for (i, number) in [one, two, &mut fit.difference].into_iter().enumerate() {
+    for (i, number) in numbers.into_iter().enumerate() {
         let Some([low, high]) = number.interval_95_s else { continue };
         for Tie { named, other, numbers, .. } in ties {
             let Some(Estimate { value, standard_error, interval_95 }) = &numbers[i] else { continue };
             let is_determined = if i == 2 { *standard_error > 0.0 } else { is_known(*value, *standard_error, policy) };
+            // What the other cause leaves open is right with the named one alone.
+            if !is_determined && i < 2 && other != named {
+                causes[i] = Some(*named);
+            }
             if is_determined {
                 let more = (low - interval_95[0]).max(0.0) + (interval_95[1] - high).max(0.0);
                 // Another form of the same effect is no other cause.
@@ -187,5 +190,36 @@ mod tests {
         let mut found = cause([Some([0.8, 1.2]), Some([0.9, 1.1])]);
         found.cover(&cause([Some([0.9, 1.5]), None]));
         assert_eq!(found.time_constants.map(|number| number.interval_95), [Some([0.8, 1.5]), Some([0.9, 1.1])]);
+    }
+
+    /// Of the time constants as found T1 is ± 2 %; with the other cause it is anything within a factor of seven and more.
+    #[test]
+    fn what_another_cause_leaves_open_is_right_with_the_named_one_alone() {
+        let estimate = |value: f64, standard_error: f64| {
+            Some(Estimate {
+                value,
+                standard_error,
+                interval_95: interval_95(value, standard_error, &Scale::Logarithmic),
+            })
+        };
+        let named = (Identifier::DELAY, Some(1));
+        let tie = |of_one: f64, other| Tie {
+            named,
+            other,
+            numbers: [estimate(1.0, of_one), estimate(3.0, 0.03), None],
+            is_inside_bounds: true,
+        };
+        let found = |ties: &[Tie]| {
+            let mut numbers = [TimeConstant::default(); 3];
+            for (number, value) in numbers.iter_mut().zip([1.0, 3.0]) {
+                number.interval_95_s = Some([0.98 * value, 1.02 * value]);
+            }
+            let (_, causes) = widen(numbers.each_mut(), ties, &Policy::default());
+            (causes, numbers[0].interval_95_s)
+        };
+        let second_lag = (Identifier::SECOND_ORDER, Some(0));
+        assert_eq!(found(&[tie(0.6, second_lag)]), ([Some(named), None, None], Some([0.98, 1.02])));
+        // Another form of the same effect is no other cause, and one that determines T1 there is none either.
+        assert_eq!(found(&[tie(0.6, named), tie(0.01, second_lag)]).0, [None; 3]);
     }
 }

@@ -342,7 +342,8 @@ impl OwnEstimate {
         normal: &NormalEquations,
     ) -> Option<Self> {
         let Fitted { model, theta, .. } = fitted;
-        let mut step = dense::times(&model.curvature(theta, observations, selection, normal)?, &normal.slope);
+        let mut step =
+            dense::times(&model.inverse_second_derivatives(theta, observations, selection, normal)?, &normal.slope);
         // The step is to the minimum, and the fit is not there.
         if let Some(bias) = fitted.removed_bias(observations, selection) {
             step.iter_mut().zip(bias).for_each(|(step, bias)| *step -= bias);

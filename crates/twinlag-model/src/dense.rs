@@ -33,7 +33,7 @@ pub fn gram(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// Inverse of a symmetric matrix that should be positive definite, scaled to unit diagonal first; rows and columns without
-/// any weight stay zero. `None` where it is singular.
+/// any weight stay zero. `None` where it is not positive definite.
 ///
 /// ```
 /// use twinlag_model::dense::{inverse, product};
@@ -44,9 +44,13 @@ pub fn gram(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// // The unit matrix, each row in its own units: rounding only.
 /// assert!((back[0][0] - 1.0).abs() < 1e-12 && (back[1][1] - 1.0).abs() < 1e-12);
 /// assert_eq!(inverse(&[vec![1.0, 1.0], vec![1.0, 1.0]]), None);
+/// assert_eq!(inverse(&[vec![1.0, 0.0], vec![0.0, -1.0]]), None);
 /// ```
 pub fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let n = matrix.len();
+    if (0..n).any(|i| matrix[i][i] < 0.0) {
+        return None;
+    }
     let used: Vec<usize> = (0..n).filter(|&i| matrix[i][i] > 0.0).collect();
     let scale: Vec<f64> = used.iter().map(|&i| matrix[i][i].sqrt()).collect();
     let scaled = Mat::from_fn(used.len(), used.len(), |p, q| matrix[used[p]][used[q]] / (scale[p] * scale[q]));

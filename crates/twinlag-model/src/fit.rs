@@ -302,19 +302,16 @@ impl Model {
         (0..p).map(|i| (0..p).map(|j| of(i, j)).collect()).collect()
     }
 
-    /// Inverse of half the second derivatives of the energy; of the products of first ones where those are not positive
-    /// definite. Two lags of a sensor count by their sum and product
-    /// ([`LagPair::without_slope`]).
-    pub(crate) fn curvature(
+    /// Inverse of half the second derivatives of the energy; `None` where these are not positive definite, so that no minimum can be
+    /// distinguished from chance.
+    pub(crate) fn inverse_second_derivatives(
         &self,
         theta: &[f64],
         observations: &Observations,
         selection: &Selection,
         normal: &NormalEquations,
     ) -> Option<Vec<Vec<f64>>> {
-        let mut second = self.second_derivatives(theta, observations, selection, normal, &[]);
-        LagPair::each(self).for_each(|pair| pair.without_slope(&mut second, &normal.slope, theta));
-        dense::inverse(&second).or_else(|| dense::inverse(&normal.products))
+        dense::inverse(&self.second_derivatives(theta, observations, selection, normal, &[]))
     }
 }
 

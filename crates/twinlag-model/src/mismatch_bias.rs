@@ -120,7 +120,7 @@ impl Fitted {
         };
         let slopes: Vec<[f64; 2]> = (0..theta.len()).map(mean_slope).collect();
         let normal = model.normal_equations(theta, observations, selection, None);
-        let inverse = model.curvature(theta, observations, selection, &normal)?;
+        let inverse = model.inverse_second_derivatives(theta, observations, selection, &normal)?;
         let correction = |sensor: usize| {
             let slope: Vec<f64> = slopes.iter().map(|of_both| of_both[sensor]).collect();
             let mut out = dense::times(&inverse, &slope);

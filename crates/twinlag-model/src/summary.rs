@@ -100,7 +100,9 @@ pub fn covariance(
     let apart = lag_pair::apart(fitted);
     let Fitted { model, theta, .. } = &apart;
     let normal = model.scored_normal_equations(theta, observations, selection, None);
-    let inverse = model.curvature(theta, observations, selection, &normal)?;
+    let mut second = model.second_derivatives(theta, observations, selection, &normal, &[]);
+    LagPair::each(model).for_each(|pair| pair.without_slope(&mut second, &normal.slope, theta));
+    let inverse = dense::inverse(&second)?;
     let white = normal.slope_covariance;
     let middle = if by_residual {
         let residual = ResidualCost::new(model, &fitted.theta, observations, selection).residuals(&fitted.theta);
@@ -273,7 +275,11 @@ mod tests {
     use twinlag_signal::Rig;
 
     use super::*;
+    use crate::model::Model;
     use crate::observations::Stretch;
+    use crate::prepare::whole_selection;
+    use crate::track::fixture;
+    use crate::weighting::Weighting;
 
     const SAMPLES: usize = 4000;
     const PERIOD_S: f64 = 0.01;
@@ -320,5 +326,17 @@ mod tests {
         let mut later = stretch(hotter);
         later.time_s = (0..SAMPLES).map(|k| 100.0 + PERIOD_S * k as f64).collect::<Vec<f64>>().into();
         assert_eq!(are_correlated(vec![stretch(noise), later]), [false; 2]);
+    }
+
+    /// Towards long time constants the energy approaches that of readings which nothing follows, and bends the other way.
+    #[test]
+    fn where_the_energy_has_no_minimum_there_is_no_covariance() {
+        let record = fixture::observations(2000, 0.05, |_| 1.0);
+        let model = Model::new(&[], [0.05; 2]);
+        let selection = whole_selection(&record, &Weighting::default());
+        let mut fitted = model.fit(&fixture::TAU_S, &record, &selection, Effort::Finish);
+        assert!(covariance(&fitted, &record, &selection, false).is_some());
+        fitted.theta = fixture::TAU_S.map(|tau_s| 30.0 * tau_s).to_vec();
+        assert_eq!(covariance(&fitted, &record, &selection, false), None);
     }
 }
