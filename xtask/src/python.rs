@@ -1,5 +1,7 @@
 //! The Python package: built as a wheel, installed in an empty environment, and tried there.
 
+mod stubs;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -31,21 +33,27 @@ pub(crate) struct Python {
     /// library takes.
     #[arg(long, conflicts_with = "debug")]
     measure: bool,
+    /// Writes the type stubs of the compiled part anew, in place of the tests.
+    #[arg(long, conflicts_with_all = ["debug", "measure"])]
+    stubs: bool,
 }
 
 impl Default for Python {
     fn default() -> Self {
-        Self { python: PYTHON.into(), debug: false, measure: false }
+        Self { python: PYTHON.into(), debug: false, measure: false, stubs: false }
     }
 }
 
 /// Builds the wheel from the sources, installs it in an empty environment, and runs its tests, its types and its stubs there.
-pub(crate) fn run(Python { python, debug, measure }: &Python) -> Result<()> {
+pub(crate) fn run(Python { python, debug, measure, stubs }: &Python) -> Result<()> {
+    let package = root()?.join("crates/twinlag-python");
+    if *stubs {
+        return stubs::write(&package);
+    }
     let work = root()?.join("target/python");
     if work.exists() {
         fs::remove_dir_all(&work).with_context(|| format!("{} cannot be removed", work.display()))?;
     }
-    let package = root()?.join("crates/twinlag-python");
     let builder = Environment::new(python, &work.join("builder"))?;
     builder.install(&["maturin>=1.9.4,<2"])?;
     let wheels = work.join("wheels");
@@ -99,7 +107,8 @@ pub(crate) fn run(Python { python, debug, measure }: &Python) -> Result<()> {
         command
     };
     step("types", &mut checked(&["mypy", "--package", "twinlag", "--config-file"]))?;
-    step("stubs", &mut checked(&["mypy.stubtest", "twinlag", "--mypy-config-file"]))
+    step("stubs", &mut checked(&["mypy.stubtest", "twinlag", "--mypy-config-file"]))?;
+    stubs::check(&package)
 }
 
 /// Says what the package takes, and for a long record what the library takes.

@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use twinlag::record::Record as Inner;
 use twinlag::{Characterisation, Compensation, Diagnosis, Track, joined};
 use twinlag_pages::{Making, diagnosis_report, gas_report, track_report};
 
+use crate::column::Column;
 use crate::error::of_verb;
 use crate::verbs::in_a_row;
 
@@ -28,6 +27,13 @@ pub(crate) enum Said {
     Diagnosis(Box<Diagnosis>),
     Compensation(Box<Compensation>),
     Track(Box<Track>),
+}
+
+/// Numbers or texts in a row.
+#[derive(IntoPyObject)]
+pub(crate) enum Series<'a> {
+    Numbers(Column<'a>),
+    Texts(Vec<String>),
 }
 
 impl Answer {
@@ -53,29 +59,27 @@ impl Answer {
         text.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// The series of the answer, by the names of the columns that the program writes; empty where it has none.
-    fn series<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let series = PyDict::new(py);
-        let add = |name: &str, values: &[f64]| series.set_item(name, PyArray1::from_slice(py, values));
+    /// The series of the answer, each with the name of the column that the program writes; none where it has none.
+    fn series(&self) -> Vec<(String, Series<'_>)> {
+        let numbers = |name: &str, values| (name.to_owned(), Series::Numbers(Column(values)));
         match &self.said {
-            Said::Characterisation(_) | Said::Diagnosis(_) => {}
-            Said::Compensation(answer) => {
-                add("time_s", &answer.time_s)?;
-                add("gas_C", &answer.gas_c)?;
-                add("gas_std_K", &answer.gas_std_k)?;
-            }
+            Said::Characterisation(_) | Said::Diagnosis(_) => Vec::new(),
+            Said::Compensation(answer) => vec![
+                numbers("time_s", &answer.time_s),
+                numbers("gas_C", &answer.gas_c),
+                numbers("gas_std_K", &answer.gas_std_k),
+            ],
             Said::Track(answer) => {
-                add("time_s", &answer.time_s)?;
-                for (sensor, number) in answer.sensors.iter().zip(["1", "2"]) {
-                    add(&format!("tau{number}_s"), &sensor.tau_s)?;
-                    add(&format!("tau{number}_low_s"), &sensor.low_s)?;
-                    add(&format!("tau{number}_high_s"), &sensor.high_s)?;
+                let mut series = vec![numbers("time_s", &answer.time_s)];
+                for (sensor, number) in answer.sensors.iter().zip(1..) {
+                    series.push(numbers(&format!("tau{number}_s"), &sensor.tau_s));
+                    series.push(numbers(&format!("tau{number}_low_s"), &sensor.low_s));
+                    series.push(numbers(&format!("tau{number}_high_s"), &sensor.high_s));
                 }
-                let grades: Vec<String> = answer.grades.iter().map(ToString::to_string).collect();
-                series.set_item("grade", grades)?;
+                series.push(("grade".into(), Series::Texts(answer.grades.iter().map(ToString::to_string).collect())));
+                series
             }
         }
-        Ok(series)
     }
 
     /// The model that the answer rests on, as JSON; `None` where there is none.

@@ -4,6 +4,7 @@
 //! JSON, in the form of `twinlag::Options`, and runs without the interpreter's lock.
 
 mod answer;
+mod column;
 mod error;
 mod live;
 mod program;

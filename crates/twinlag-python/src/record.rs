@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use twinlag::record::{NamedColumn, Record as Inner, Selection, Table};
 use twinlag_files::Choice;
 
+use crate::column::Column;
 use crate::error::{of_file, of_record};
 use crate::verbs::parsed;
 
@@ -111,25 +112,25 @@ impl Record {
 
     /// Instants, s from the first.
     #[getter]
-    fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.inner.time_s)
+    fn time_s(&self) -> Column<'_> {
+        Column(&self.inner.time_s)
     }
 
     /// Readings of the first sensor, °C; NaN where one is missing.
     #[getter]
-    fn t1_c<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.inner.t1_c)
+    fn t1_c(&self) -> Column<'_> {
+        Column(&self.inner.t1_c)
     }
 
     /// Readings of the second sensor, °C; NaN where one is missing.
     #[getter]
-    fn t2_c<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.inner.t2_c)
+    fn t2_c(&self) -> Column<'_> {
+        Column(&self.inner.t2_c)
     }
 
     /// The reference, °C, if there is one.
     #[getter]
-    fn reference_c<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
-        self.inner.reference_c.as_ref().map(|reference| PyArray1::from_slice(py, reference))
+    fn reference_c(&self) -> Option<Column<'_>> {
+        self.inner.reference_c.as_deref().map(Column)
     }
 }

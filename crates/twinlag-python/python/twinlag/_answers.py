@@ -45,7 +45,7 @@ class Answer:
 
     @classmethod
     def _of(cls, inner: _core.Answer) -> Any:
-        return cls(inner, json.loads(inner.json()), inner.series())
+        return cls(inner, json.loads(inner.json()), dict(inner.series()))
 
     @property
     def _model_fields(self) -> dict[str, Any]:

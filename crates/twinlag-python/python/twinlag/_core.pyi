@@ -1,77 +1,155 @@
-"""The compiled part of `twinlag`."""
+"""
+The compiled part of `twinlag`.
+"""
 
-from collections.abc import Callable
-from typing import Any, final
+from _typeshed import Incomplete, SupportsGetItem
+from numpy import float64
+from numpy.typing import NDArray
+from os import PathLike
+from typing import Any, Final, SupportsFloat, SupportsIndex, final
 
-import numpy as np
-import numpy.typing as npt
+__all__ = ["TEMPERATURE_RANGE_C", "VERSION", "Answer", "Live", "Record", "characterise", "compensate", "diagnose", "run_program", "simulate", "track"]
 
-_Array = npt.NDArray[np.float64]
-_Column = tuple[str, str, Any]
-_Progress = Callable[[str, int, int], object] | None
+TEMPERATURE_RANGE_C: Final[tuple[float, float]]
+"""
+Both ends of what a temperature can be, °C.
+"""
 
-__all__ = [
-    "TEMPERATURE_RANGE_C",
-    "VERSION",
-    "Answer",
-    "Live",
-    "Record",
-    "characterise",
-    "compensate",
-    "diagnose",
-    "run_program",
-    "simulate",
-    "track",
-]
-
-TEMPERATURE_RANGE_C: tuple[float, float]
-VERSION: str
-
-@final
-class Record:
-    @staticmethod
-    def from_columns(source: str, columns: list[_Column], selection: str) -> Record: ...
-    @staticmethod
-    def read(path: str, selection: str, group: str | None = None, join: bool = False) -> Record: ...
-    @property
-    def source(self) -> str: ...
-    @property
-    def channels(self) -> tuple[str, str]: ...
-    @property
-    def notes(self) -> list[str]: ...
-    @property
-    def missing(self) -> int: ...
-    @property
-    def sample_period_s(self) -> float: ...
-    @property
-    def time_s(self) -> _Array: ...
-    @property
-    def t1_c(self) -> _Array: ...
-    @property
-    def t2_c(self) -> _Array: ...
-    @property
-    def reference_c(self) -> _Array | None: ...
-    def __len__(self) -> int: ...
+VERSION: Final[str]
+"""
+The version of the library.
+"""
 
 @final
 class Answer:
-    def json(self) -> str: ...
-    def series(self) -> dict[str, Any]: ...
-    def model(self) -> str | None: ...
-    def page(self, made_at: str, is_static: bool, is_first_screen: bool) -> str | None: ...
+    """
+    What a verb has said, with the records that it was asked about.
+    """
+    def json(self, /) -> str:
+        """
+        The answer in the form of the program's `--json`.
+        """
+    def model(self, /) -> str | None:
+        """
+        The model that the answer rests on, as JSON; `None` where there is none.
+        """
+    def page(self, /, made_at: str, is_static: bool, is_first_screen: bool) -> str | None:
+        """
+        The page of the answer, one HTML file, or its first screen; `None` of a characterisation, which has none.
+        """
+    def series(self, /) -> list[tuple[str, NDArray[float64] | list[str]]]:
+        """
+        The series of the answer, each with the name of the column that the program writes; none where it has none.
+        """
 
 @final
 class Live:
-    def __new__(cls, record: Record, asked: str) -> Live: ...
+    """
+    Tracks both sensors after a start.
+    """
+    def __new__(cls, /, record: Record, asked: str) -> Live: ...
+    def push(self, /, t1_c: SupportsFloat | SupportsIndex | None, t2_c: SupportsFloat | SupportsIndex | None, time_s: SupportsFloat | SupportsIndex | None = None) -> tuple[float, float, float, tuple[float | None, float | None], tuple[tuple[float, float] | None, tuple[float, float] | None], bool, float, bool] | None:
+        """
+        What is known once a row is read: time, gas temperature and its standard deviation, then time constant and band of each
+        sensor, whether they may have left the range that is tracked, what the bands were multiplied by, and whether there was a long pause; `None` of a row that is
+        left out.
+        """
     @property
-    def start(self) -> Answer: ...
-    def push(
-        self, t1_c: float | None, t2_c: float | None, time_s: float | None = None
-    ) -> tuple[float, float, float, tuple[float | None, float | None], Any, bool, float, bool] | None: ...
+    def start(self, /) -> Answer:
+        """
+        The characterisation of the start.
+        """
 
-def characterise(records: list[Record], asked: str, progress: _Progress = None) -> Answer: ...
-def diagnose(records: list[Record], asked: str, progress: _Progress = None) -> Answer: ...
-def compensate(record: Record, asked: str, progress: _Progress = None) -> Answer: ...
-def track(record: Record, asked: str, progress: _Progress = None) -> Answer: ...
-def simulate(rig: str, is_json: bool, source: str) -> Record: ...
-def run_program(arguments: list[str]) -> int: ...
+@final
+class Record:
+    """
+    Two temperatures over time, checked.
+    """
+    def __len__(self, /) -> int: ...
+    @property
+    def channels(self, /) -> tuple[str, str]:
+        """
+        Names of the two sensors.
+        """
+    @staticmethod
+    def from_columns(source: str, columns: SupportsGetItem[int, tuple[str, str, Incomplete | SupportsGetItem[int, str]]], selection: str) -> Record:
+        """
+        A record of columns: name, unit and array of each.
+        """
+    @property
+    def missing(self, /) -> int:
+        """
+        Rows in which a temperature is missing.
+        """
+    @property
+    def notes(self, /) -> list[str]:
+        """
+        How it was read.
+        """
+    @staticmethod
+    def read(path: str | PathLike[str], selection: str, group: str | None = None, join: bool = False) -> Record:
+        """
+        A record of a file.
+        """
+    @property
+    def reference_c(self, /) -> NDArray[float64] | None:
+        """
+        The reference, °C, if there is one.
+        """
+    @property
+    def sample_period_s(self, /) -> float:
+        """
+        Time between samples, s: of uneven ones the median.
+        """
+    @property
+    def source(self, /) -> str:
+        """
+        What it is called in messages.
+        """
+    @property
+    def t1_c(self, /) -> NDArray[float64]:
+        """
+        Readings of the first sensor, °C; NaN where one is missing.
+        """
+    @property
+    def t2_c(self, /) -> NDArray[float64]:
+        """
+        Readings of the second sensor, °C; NaN where one is missing.
+        """
+    @property
+    def time_s(self, /) -> NDArray[float64]:
+        """
+        Instants, s from the first.
+        """
+
+def characterise(records: SupportsGetItem[int, Record], asked: str, progress: Any | None = None) -> Answer:
+    """
+    Estimates both time constants of a record, or of several of one rig.
+    """
+
+def compensate(record: Record, asked: str, progress: Any | None = None) -> Answer:
+    """
+    Reconstructs the gas temperature.
+    """
+
+def diagnose(records: SupportsGetItem[int, Record], asked: str, progress: Any | None = None) -> Answer:
+    """
+    Finds the effects that two first-order lags lack, in a record or in several of one rig.
+    """
+
+def run_program(arguments: SupportsGetItem[int, str]) -> int:
+    """
+    Runs the program and returns its exit code.
+
+    - `arguments`: those of a command line; the first is the script that was started
+    """
+
+def simulate(rig: str, is_json: bool, source: str) -> Record:
+    """
+    Simulates a rig, given as TOML or, with `is_json`, as JSON.
+    """
+
+def track(record: Record, asked: str, progress: Any | None = None) -> Answer:
+    """
+    Estimates both time constants along a record.
+    """
