@@ -1,8 +1,10 @@
-//! Release archives: the program with its manual, the book, completions and licences, as one file for each platform.
+//! Release archives: the program with its manual, the book, completions, licences and a bill of materials, as one file for each platform.
 //!
 //! An archive is the same to the byte wherever the repository lies, as long as compiler, dependencies and platform are the same: paths
 //! of the machine are taken out of the program, and entries are in order, with one date and one owner. An archive for another platform takes its
 //! target of Rust and a linker for it; runners of a CI service have each its own.
+
+mod bill;
 
 use std::fs::{self, File};
 use std::io::{Read, Write as _};
@@ -19,6 +21,9 @@ use crate::{book, root};
 
 /// Files of the repository that go with the program.
 const BESIDE: [&str; 5] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT", "CITATION.cff"];
+/// The package that is the program, and the features that it is built with.
+const PACKAGE: &str = "twinlag-cli";
+const FEATURES: &str = "s3";
 const SHELLS: [&str; 4] = ["bash", "zsh", "fish", "powershell"];
 
 /// Makes a release archive.
@@ -89,6 +94,11 @@ fn make(target: &str, host: &str, build: &Path, out: &Path) -> Result<PathBuf> {
         let page = page?;
         entries.push((Path::new("man").join(page.file_name()), fs::read(page.path())?, false));
     }
+    entries.push((
+        PathBuf::from("bill-of-materials.cdx.json"),
+        serde_json::to_vec_pretty(&bill::bill(target)?)?,
+        false,
+    ));
     entries.sort();
     if target.contains("windows") {
         let archive = out.join(format!("{folder}.zip"));
@@ -152,9 +162,9 @@ fn compiled(target: &str, build: &Path) -> Result<PathBuf> {
             "dist",
             "--locked",
             "--package",
-            "twinlag-cli",
+            PACKAGE,
             "--features",
-            "s3",
+            FEATURES,
             "--target",
             target,
             "--target-dir",
