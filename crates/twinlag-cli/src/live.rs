@@ -1,7 +1,7 @@
 //! `twinlag track - --live ROWS --out -`: rows are processed as they arrive.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Write, stdin, stdout};
+use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Read, Write, stdin, stdout};
 use std::path::Path;
 
 use twinlag::diagnosis::Grade;
@@ -16,6 +16,8 @@ use crate::grades;
 use crate::print;
 
 const HEADER: &str = "time_s,gas_C,gas_std_K,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau2_high_s";
+/// Longest line that is read, in bytes: that of fifty thousand columns. What sends no line breaks would otherwise fill the memory.
+const MAX_LINE_BYTES: usize = 1 << 20;
 /// Number of warnings about bad rows that are printed one by one.
 const MAX_WARNINGS: usize = 5;
 
@@ -171,9 +173,15 @@ impl Lines {
     }
 
     fn bytes(&mut self, to: &mut Vec<u8>) -> Result<bool, Failure> {
-        let read = self.from.read_until(b'\n', to);
+        let read = (&mut self.from).take(MAX_LINE_BYTES as u64 + 1).read_until(b'\n', to);
         let read = read.map_err(|e| RecordError::CannotRead { file: self.name.clone(), reason: e.to_string() })?;
         self.number += usize::from(read > 0);
+        if read > MAX_LINE_BYTES {
+            let (name, number) = (&self.name, self.number);
+            return Err(Failure::File(format!(
+                "{name}: line {number} is longer than {MAX_LINE_BYTES} bytes: expected rows of text, each ended by a line break"
+            )));
+        }
         Ok(read > 0)
     }
 

@@ -166,6 +166,16 @@ fn a_dead_sensor_leaves_cells_empty() {
     assert_eq!(rows.last().expect("rows").iter().filter(|c| c.is_empty()).count(), 0, "{:?}", rows.last());
 }
 
+/// After the start a port sends two megabytes without a line break.
+#[test]
+fn a_line_that_does_not_end_is_refused() {
+    let (bench, mut text) = record("endless");
+    text.push_str(&"7".repeat(1 << 21));
+    let output = bench.run_with_input(&LIVE, text.as_bytes());
+    assert_eq!(output.code, 3, "{output:#?}");
+    output.says(&["standard input: line 5002 is longer than 1048576 bytes", "line break"]);
+}
+
 #[test]
 fn what_cannot_be_answered_live_is_refused() {
     let (bench, _) = record("refused");
