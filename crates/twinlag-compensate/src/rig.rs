@@ -131,6 +131,12 @@ impl Rig {
 
 #[cfg(feature = "std")]
 impl Rig {
+    /// What each reading has of the gas at `frequency_hz`: of the second channel with its delay.
+    pub(crate) fn responses(&self, frequency_hz: f64) -> [Complex64; 2] {
+        let [first, second] = self.sensors.each_ref().map(|sensor| sensor.response(frequency_hz));
+        [first, second * Complex64::cis(-core::f64::consts::TAU * frequency_hz * self.delay_s)]
+    }
+
     pub(crate) fn check(&self) -> Result<(), CompensateError> {
         let positive = |what: &str, got: f64| {
             let is_good = got.is_finite() && got > 0.0;
