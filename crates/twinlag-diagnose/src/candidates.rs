@@ -473,7 +473,7 @@ impl<'a> Search<'a> {
         let fits = |model: &Model, theta: &[f64]| {
             let mut fits = vec![model.fit(theta, observations, selection, Effort::Look)];
             if effect.parameters().len() <= MOST_GRID_PARAMETERS {
-                fits.push(self.over_grid(model, &theta[2..]));
+                fits.push(self.over_grid(model, theta));
             }
             fits
         };
@@ -518,18 +518,32 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The best fit to an excerpt from a grid of time constants.
-    fn over_grid(&self, model: &Model, rest: &[f64]) -> Fitted {
+    /// The best fit to an excerpt from a grid of time constants, from the lowest point of either order. A second lag that was added last keeps
+    /// its share of the first.
+    ///
+    /// - `theta`: parameters of which the time constants do not count
+    fn over_grid(&self, model: &Model, theta: &[f64]) -> Fitted {
         let (observations, selection) = self.excerpt();
         let (low, high) = (GRID_FROM_PERIODS * self.context.step_s, GRID_TO_SHARE * self.context.span_s());
         let at = |i: usize| low * (high / low).powf(i as f64 / (GRID_POINTS - 1) as f64);
-        let pairs = (0..GRID_POINTS).flat_map(|i| (0..GRID_POINTS).map(move |j| (i, j)));
-        let points = pairs.map(|(i, j)| {
-            let theta: Vec<f64> = [at(i), at(j)].into_iter().chain(rest.iter().copied()).collect();
-            (model.energy(&theta, observations, selection), theta)
+        let second_lag = model.effects.last().and_then(|effect| {
+            let place = model.range(model.effects.len() - 1).start + effect.series_lag()?;
+            Some((effect.channel()?, place))
         });
-        let best = points.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a grid has points");
-        model.fit(&best.1, observations, selection, Effort::Look)
+        let pairs = (0..GRID_POINTS).flat_map(|i| (0..GRID_POINTS).map(move |j| [i, j]));
+        let points = pairs.map(|pair| {
+            let mut at_point = theta.to_vec();
+            at_point[..2].copy_from_slice(&pair.map(at));
+            if let Some((sensor, place)) = second_lag {
+                at_point[place] *= at_point[sensor] / theta[sensor];
+            }
+            (model.energy(&at_point, observations, selection), at_point)
+        });
+        let (shorter, longer): (Vec<_>, Vec<_>) = points.partition(|(_, theta)| theta[0] < theta[1]);
+        let lowest = |points: Vec<(f64, Vec<f64>)>| points.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        let starts = [shorter, longer].into_iter().filter_map(lowest);
+        best(starts.map(|(_, theta)| model.fit(&theta, observations, selection, Effort::Look)))
+            .expect("a grid has points of either order")
     }
 }
 

@@ -63,7 +63,8 @@ pub(crate) fn minimise_whitened<'a, const P: usize>(
     };
     // At second order each evaluation is the banded one anyway.
     let readings = whitened.readings();
-    let starts_on = |cost: &EstimatorCost<'a>| starts(&Objective::<P> { cost, priors }, readings, variables);
+    let starts_on =
+        |cost: &EstimatorCost<'a>| starts(&Objective::<P> { cost, priors }, readings, variables, [false; 2]);
     let stand_in = if P == 6 || !own.is_empty() { None } else { stand_in(&whitened, P == 4)? };
     let whitened = if P == 6 { whitened } else { whitened.compressed(P == 4) };
     let cost = EstimatorCost::Whitened(whitened);

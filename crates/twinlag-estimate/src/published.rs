@@ -115,7 +115,7 @@ fn minimise<'a, const P: usize>(
         if all.best().end == End::LimitReached {
             // In the right valley, but rounding keeps a solver that compares values from settling
             // there: from elsewhere it may.
-            let own = own_starts(&objective, task.readings, variables);
+            let own = own_starts(&objective, task.readings, variables, [false; 2]);
             all = MultiStart::run(&problem, task.minimiser, &own, &Budget::default())?;
             add(&mut evaluations, sum(all.fits()));
         }

@@ -25,11 +25,15 @@ const SECOND_LAG_SHARES: [f64; 3] = [0.05, 0.3, 0.8];
 /// Starts for `objective`, data-driven: the difference equation's least squares, and the lowest
 /// points of a logarithmic grid for either order of the time constants. Gain and offset take one
 /// Newton step of their own at each point.
+///
+/// - `second_order`: which sensors have a second lag, in several sizes at each point
 pub(crate) fn starts<const P: usize>(
     objective: &Objective<'_, '_, P>,
     readings: &Readings,
     variables: &[Variable],
+    second_order: [bool; 2],
 ) -> Vec<Vec<f64>> {
+    let shares = second_lag_shares(second_order);
     let step_s = readings.mean_step_s();
     let (shortest, longest) = (GRID_MIN_PERIODS * step_s, GRID_MAX_SPANS * readings.span_s());
     let axis: Vec<f64> =
@@ -37,12 +41,14 @@ pub(crate) fn starts<const P: usize>(
     let offset_k = if P > 2 { mean_difference(readings) } else { 0.0 };
     let mut grid: Vec<(f64, Vec<f64>)> = Vec::new();
     let mut add = |tau1: f64, tau2: f64| {
-        let mut x: Vec<f64> = [tau1, tau2, 1.0, offset_k, 0.0, 0.0][..P].to_vec();
-        hold_known(&mut x, variables);
-        settle_calibration(objective, &mut x, variables);
-        let value = objective.at(&x).value;
-        if value.is_finite() {
-            grid.push((value, x));
+        for [s1, s2] in &shares {
+            let mut x: Vec<f64> = [tau1, tau2, 1.0, offset_k, s1 * tau1, s2 * tau2][..P].to_vec();
+            hold_known(&mut x, variables);
+            settle_calibration(objective, &mut x, variables);
+            let value = objective.at(&x).value;
+            if value.is_finite() {
+                grid.push((value, x));
+            }
         }
     };
     if let Ok([tau1, tau2]) = difference_equation_least_squares(readings) {
@@ -75,19 +81,24 @@ pub(crate) fn starts<const P: usize>(
 /// - `first`: time constants, gain and offset of that fit
 /// - `second_order`: which sensors have a second lag
 pub(crate) fn second_lags<const P: usize>(first: &[f64; 4], second_order: [bool; 2]) -> Vec<Vec<f64>> {
-    let [small, middle, large] = SECOND_LAG_SHARES;
-    let each = SECOND_LAG_SHARES.into_iter();
-    let shares: Vec<[f64; 2]> = match second_order {
-        [true, true] => vec![[small; 2], [middle; 2], [large; 2], [small, large], [large, small]],
-        [_, false] => each.map(|share| [share, 0.0]).collect(),
-        [false, true] => each.map(|share| [0.0, share]).collect(),
-    };
     let start = |[s1, s2]: &[f64; 2]| {
         // Both lags together delay as much as the one that was found.
         let (t1, t2) = (first[0] / (1.0 + s1), first[1] / (1.0 + s2));
         [t1, t2, first[2], first[3], s1 * t1, s2 * t2][..P].to_vec()
     };
-    shares.iter().map(start).collect()
+    second_lag_shares(second_order).iter().map(start).collect()
+}
+
+/// Second lags that fits start from, of each sensor as a share of its first.
+fn second_lag_shares(second_order: [bool; 2]) -> Vec<[f64; 2]> {
+    let [small, middle, large] = SECOND_LAG_SHARES;
+    let each = SECOND_LAG_SHARES.into_iter();
+    match second_order {
+        [false, false] => vec![[0.0; 2]],
+        [true, true] => vec![[small; 2], [middle; 2], [large; 2], [small, large], [large, small]],
+        [true, false] => each.map(|share| [share, 0.0]).collect(),
+        [false, true] => each.map(|share| [0.0, share]).collect(),
+    }
 }
 
 /// Moves `x` inside the bounds of `variables`, what is held to its value.

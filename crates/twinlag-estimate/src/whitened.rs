@@ -18,7 +18,7 @@ use crate::levels::NoiseLevels;
 use crate::objective::{EstimatorCost, Objective, Prior};
 use crate::outcome::Solved;
 use crate::second_lag::Unseen;
-use crate::starts::{hold_known, second_lags};
+use crate::starts::{hold_known, second_lags, starts};
 use crate::task::Task;
 use crate::vocabulary::{NoiseColour, NoiseKnowledge};
 
@@ -409,6 +409,19 @@ fn minimise<'a, const P: usize>(
     };
     let mut done = run(whitened, own)?;
     add(&mut evaluations, done.evaluations());
+    let is_own_start = from.is_none() && task.starts_s.is_empty();
+    if P == 6 && is_own_start && done.all.best().value > ENERGY_THAT_OUTWEIGHS_NOISE * task.readings.len() as f64 {
+        // What two lags alone come to may lie in another valley.
+        let (first, cost) = (done.all, EstimatorCost::Whitened(done.whitened));
+        let second_order = [4, 5].map(|i| variables[i].lower < variables[i].upper);
+        let grid = starts(&Objective::<P> { cost: &cost, priors }, task.readings, variables, second_order);
+        let EstimatorCost::Whitened(whitened) = cost else { unreachable!("built as whitened above") };
+        done = run(whitened, grid)?;
+        add(&mut evaluations, done.evaluations());
+        if first.best().value <= done.all.best().value {
+            done.all = first;
+        }
+    }
     let mut ends: Vec<Vec<f64>> = done.all.fits().iter().map(|f| f.x.clone()).collect();
     if let Some(swapped) = larger_first::<P>(&done.all.best().x, variables, priors) {
         done = run(done.whitened, vec![swapped])?;

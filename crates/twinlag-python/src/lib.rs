@@ -24,7 +24,7 @@ mod _core {
     #[pymodule_export]
     use super::record::Record;
     #[pymodule_export]
-    use super::verbs::{characterise, compensate, diagnose, simulate, track};
+    use super::verbs::{characterise, check_model, compensate, diagnose, simulate, track};
 
     #[pymodule_export]
     use super::program::run_program;

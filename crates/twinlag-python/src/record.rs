@@ -6,7 +6,7 @@ use std::sync::Arc;
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use twinlag::record::{NamedColumn, Record as Inner, Selection, Table};
+use twinlag::record::{NamedColumn, Record as Inner, SamplingKind, Selection, Table};
 use twinlag_files::Choice;
 
 use crate::column::Column;
@@ -106,6 +106,12 @@ impl Record {
         self.inner.sampling.period_s
     }
 
+    /// Whether samples are taken to be where their stamps are, uneven ones.
+    #[getter]
+    fn is_irregular(&self) -> bool {
+        self.inner.sampling.kind == SamplingKind::Irregular
+    }
+
     fn __len__(&self) -> usize {
         self.inner.len()
     }
@@ -132,5 +138,17 @@ impl Record {
     #[getter]
     fn reference_c(&self) -> Option<Column<'_>> {
         self.inner.reference_c.as_deref().map(Column)
+    }
+
+    /// The flow in the unit of its column, if there is one.
+    #[getter]
+    fn flow(&self) -> Option<Column<'_>> {
+        self.inner.flow.as_deref().map(Column)
+    }
+
+    /// The speed of sensors that move, m/s, if their position is known.
+    #[getter]
+    fn speed_m_s(&self) -> Option<Column<'_>> {
+        self.inner.speed_m_s.as_deref().map(Column)
     }
 }

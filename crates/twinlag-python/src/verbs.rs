@@ -130,6 +130,16 @@ pub(crate) fn track(
     Ok(Answer { said: Said::Track(Box::new(answer)), records: vec![record] })
 }
 
+/// Fails where a text is no model that this version reads.
+#[pyfunction]
+pub(crate) fn check_model(text: &str) -> PyResult<()> {
+    let Model { schema, .. } = parsed(text)?;
+    let is_read = schema == Model::SCHEMA;
+    is_read
+        .then_some(())
+        .ok_or_else(|| PyValueError::new_err(format!("expected schema {}, got {schema}", Model::SCHEMA)))
+}
+
 /// Simulates a rig, given as TOML or, with `is_json`, as JSON.
 #[pyfunction]
 pub(crate) fn simulate(py: Python<'_>, rig: &str, is_json: bool, source: String) -> PyResult<Record> {

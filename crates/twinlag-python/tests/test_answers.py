@@ -177,3 +177,43 @@ def test_rigs_come_as_text_mapping_or_file(tmp_path) -> None:
     assert tl.simulate(rig).channels == ("a", "b")
     with pytest.raises(ValueError, match="seed|missing|expected"):
         tl.simulate({"seed": 1})
+
+
+def test_names_of_the_record_go_before_those_of_the_library(arrays) -> None:
+    time_s, t1, t2 = arrays
+    plain = tl.Record(time_s, t1, t2, names=("a", "b"))
+    crossed = tl.Record(time_s, t1, t2, names=("T2", "T1"))
+    want = tl.characterise(plain, known={"a": (0.05, 0.02)}).sensors[0].time_constant_s
+    assert tl.characterise(crossed, known={"T2": (0.05, 0.02)}).sensors[0].time_constant_s == want
+    assert tl.characterise(crossed, known={"T1": (0.05, 0.02)}).sensors[0].time_constant_s != want
+    for of_plain, of_crossed in ((None, None), ("a", "T2"), ("b", "T1")):
+        gas = tl.compensate(crossed, trust=of_crossed)
+        assert np.array_equal(gas.gas_c, tl.compensate(plain, trust=of_plain).gas_c)
+
+
+def test_a_model_of_another_schema_is_refused(diagnosis, tmp_path) -> None:
+    path = tmp_path / "model.json"
+    for fields in ({**diagnosis.model.to_dict(), "schema": "twinlag.model/99"}, {"schema": "twinlag.model/1"}, [], 1):
+        path.write_text(json.dumps(fields), encoding="utf-8")
+        with pytest.raises(ValueError, match="expected a model"):
+            tl.load_model(path)
+    with pytest.raises(TypeError, match="load_model"):
+        tl.compensate(tl.simulate(tl.EXAMPLE_RIG), model=str(path))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"noise_std_k": (np.nan, 0.1)},
+        {"noise_ratio": np.inf},
+        {"known": {"T1": np.nan}},
+        {"known": {"T1": (0.1,)}},
+        {"known": {"T1": True}},
+        {"quiet_s": (0, 1)},
+        {"quiet_s": [(0, np.nan)]},
+    ],
+)
+def test_options_that_are_no_numbers_are_named(rig, options) -> None:
+    with pytest.raises(ValueError, match=next(iter(options))):
+        tl.characterise(rig, **options)
+    assert tl.characterise(rig, free=None, second_order=None, noise_ratio=np.float32(1.0)).ok

@@ -175,3 +175,36 @@ def test_a_record_survives_pickling(rig) -> None:
     again = pickle.loads(pickle.dumps(rig))
     assert again.channels == rig.channels and np.array_equal(again.t1_c, rig.t1_c)
     assert tl.characterise(again).sensors[0].time_constant_s == tl.characterise(rig).sensors[0].time_constant_s
+
+
+def test_a_record_with_a_flow_keeps_it_when_pickled(arrays) -> None:
+    time_s, t1, t2 = arrays
+    flow = 2.0 + np.sin(time_s)
+    record = tl.Record(time_s, t1, t2, flow=flow)
+    again = pickle.loads(pickle.dumps(record))
+    assert np.array_equal(record.flow, flow) and np.array_equal(again.flow, flow)
+    assert tl.characterise(again).to_dict() == tl.characterise(record).to_dict()
+    moving = tl.Record(time_s, t1, t2, position=time_s + 0.1 * np.sin(time_s))
+    assert moving.speed_m_s is not None
+    with pytest.raises(TypeError, match="position"):
+        pickle.dumps(moving)
+
+
+def test_stamps_that_count_something_shorter_than_seconds_are_refused(arrays) -> None:
+    time_s, t1, t2 = arrays
+    milliseconds = (1.7e12 + 1000.0 * time_s).astype(np.int64)
+    with pytest.raises(tl.RecordError, match="time_unit"):
+        tl.Record(milliseconds, t1, t2)
+    assert tl.Record(milliseconds, t1, t2, time_unit="ms").sample_period_s == pytest.approx(time_s[1] - time_s[0])
+
+
+@pytest.mark.parametrize("what", [{"T1": [1.0]}, [1.0, 2.0], np.zeros((3, 2)), None])
+def test_what_is_no_frame_is_refused(what: object) -> None:
+    with pytest.raises(TypeError, match="data frame"):
+        tl.Record.from_frame(what)
+
+
+@pytest.mark.parametrize("names", ["ab", ("a",), (1, 2)])
+def test_names_that_are_not_two_are_refused(arrays, names: object) -> None:
+    with pytest.raises(TypeError, match="names of both sensors"):
+        tl.Record(*arrays, names=names)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from twinlag._errors import RecordError
@@ -12,6 +13,25 @@ if TYPE_CHECKING:
 
 Column = tuple[str, str, Any]
 """Name, unit, and an array of doubles, of nanoseconds since 1970-01-01, or a list of texts."""
+
+
+LATEST_STAMP_S = 1e11
+"""Seconds since 1970 up to which a stamp may be one: to the year 5138. Larger ones count something shorter."""
+
+
+def finite(value: Any, name: str) -> float:
+    """A finite number, whether of Python or of NumPy.
+
+    >>> finite(2, "window_s")
+    2.0
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: expected a number, got {value!r}") from None
+    if isinstance(value, bool) or not math.isfinite(number):
+        raise ValueError(f"{name}: expected a finite number, got {value!r}")
+    return number
 
 
 def _one_dimensional(values: Any, name: str) -> Any:
@@ -89,4 +109,7 @@ def times(values: Any, unit: str) -> Column:
         return "time", "s", numbers(array / np.timedelta64(1, "s"), "time")
     if array.dtype.kind in "US":
         return "time", "", [str(cell) for cell in array]
-    return "time", unit, numbers(array, "time")
+    instants = numbers(array, "time")
+    if unit == "s" and len(instants) and abs(instants[0]) > LATEST_STAMP_S:
+        raise RecordError(f"time: {instants[0]:.6g} s is no instant that anybody has seen: say what it counts, as time_unit='ms'")
+    return "time", unit, instants

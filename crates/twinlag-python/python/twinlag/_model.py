@@ -6,6 +6,7 @@ import json
 import os
 from typing import TYPE_CHECKING, Any
 
+from twinlag import _core
 from twinlag._files import replace
 from twinlag._part import Part
 
@@ -52,10 +53,10 @@ def load_model(path: str | os.PathLike[str]) -> Model:
         It is no such file.
     """
     with open(path, encoding="utf-8") as file:
-        try:
-            fields = json.load(file)
-        except ValueError:
-            fields = None
-    if not isinstance(fields, dict) or not str(fields.get("schema", "")).startswith("twinlag.model/"):
-        raise ValueError(f"{os.fspath(path)}: expected a model written by `twinlag diagnose --save` or Model.save")
-    return Model(fields)
+        text = file.read()
+    try:
+        _core.check_model(text)
+    except ValueError as error:
+        expected = "expected a model written by `twinlag diagnose --save` or Model.save"
+        raise ValueError(f"{os.fspath(path)}: {expected}: {error}") from None
+    return Model(json.loads(text))

@@ -7,7 +7,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from twinlag import _core
-from twinlag._columns import Column, numbers, times
+from twinlag._columns import Column, finite, numbers, times
 from twinlag._errors import RecordError
 
 if TYPE_CHECKING:
@@ -39,6 +39,8 @@ class Record:
         Time from sample to sample, s, in place of `time`.
     time_unit : str
         Unit of `time` where that has numbers: ``"s"``, ``"ms"``, ``"us"``, ``"min"``.
+    sampling : {"auto", "uniform", "as-stamped"}
+        How stamps are to be understood.
     source : str
         What it is called in messages.
 
@@ -72,13 +74,14 @@ class Record:
         position: Any = None,
         period_s: float | None = None,
         time_unit: str = "s",
+        sampling: str = "auto",
         source: str = "arrays",
     ) -> None:
-        first, second = names
+        first, second = _two_names(names)
         if first == second:
             raise RecordError(f"names: expected two names, got {first!r} twice")
         columns: list[Column] = [(first, unit, numbers(t1, first)), (second, unit, numbers(t2, second))]
-        selection: dict[str, Any] = {"t1": 1, "t2": 2}
+        selection: dict[str, Any] = {"t1": 1, "t2": 2, "sampling": sampling}
         others = [("reference", reference, unit), ("flow", flow, ""), ("position", position, "m")]
         for name, values, its_unit in others:
             if values is not None:
@@ -88,7 +91,7 @@ class Record:
             columns.append(times(time, time_unit))
             selection["time"] = len(columns)
         if period_s is not None:
-            selection["period_s"] = float(period_s)
+            selection["period_s"] = finite(period_s, "period_s")
         elif time is None:
             raise RecordError("expected the instants, time, or the time from one sample to the next, period_s")
         self._inner = _core.Record.from_columns(source, columns, json.dumps(selection))
@@ -197,6 +200,16 @@ class Record:
         """The reference, °C; a copy."""
         return self._inner.reference_c
 
+    @property
+    def flow(self) -> NDArray[float64] | None:
+        """The flow velocity or density, in the unit of its column; a copy."""
+        return self._inner.flow
+
+    @property
+    def speed_m_s(self) -> NDArray[float64] | None:
+        """The speed of sensors that move, m/s, of their position; a copy."""
+        return self._inner.speed_m_s
+
     def __len__(self) -> int:
         return len(self._inner)
 
@@ -206,7 +219,15 @@ class Record:
         return f"<Record {self.source!r}: {first} and {second}, {len(self)} samples, one every {period_s} s>"
 
     def __reduce__(self) -> Any:
-        state = {"names": self.channels, "reference": self.reference_c, "source": self.source}
+        if self.speed_m_s is not None:
+            raise TypeError("a record with a position keeps the speed alone and cannot be pickled: pickle what it was made of")
+        state = {
+            "names": self.channels,
+            "reference": self.reference_c,
+            "flow": self.flow,
+            "sampling": "as-stamped" if self._inner.is_irregular else "uniform",
+            "source": self.source,
+        }
         return _unpickled, (self.time_s, self.t1_c, self.t2_c, state)
 
     def to_frame(self) -> Any:
@@ -218,6 +239,13 @@ class Record:
         if self.reference_c is not None:
             columns["reference"] = self.reference_c
         return pd.DataFrame(columns, index=pd.Index(self.time_s, name="time_s"))
+
+
+def _two_names(names: Any) -> tuple[str, str]:
+    """The names of both sensors."""
+    if isinstance(names, str) or len(names) != 2 or not all(isinstance(name, str) for name in names):
+        raise TypeError(f"names: expected the names of both sensors, got {names!r}")
+    return tuple(names)
 
 
 def _unpickled(time_s: Any, t1: Any, t2: Any, state: dict[str, Any]) -> Record:
@@ -287,6 +315,9 @@ def _columns_of(frame: Any) -> list[Column]:
     """The columns of a frame that can be read: numbers, instants, texts."""
     if hasattr(frame, "data_vars"):
         return _columns_of_dataset(frame)
+    if not hasattr(frame, "columns") or not hasattr(frame, "__getitem__") or hasattr(frame, "collect"):
+        kind = type(frame).__name__
+        raise TypeError(f"expected a data frame of pandas or polars, or a dataset of xarray, got {kind}; Record takes arrays")
     columns: list[Column] = []
     index = getattr(frame, "index", None)
     if index is not None and not callable(index):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from twinlag import _core
 from twinlag._answers import Characterisation, Compensation, Diagnosis, Track
+from twinlag._columns import finite
 from twinlag._model import Model
 from twinlag._progress import shown
 from twinlag._record import Record
@@ -76,17 +77,19 @@ def _options(channels: tuple[str, str], **given: Unpack[Options]) -> dict[str, A
         "free_offset": "offset" in free,
         "second_order": [place in {sensors[name] for name in second_order} for place in (0, 1)],
         "known": [_known(name, value, channels) for name, value in _mapping(given.get("known")).items()],
-        "quiet_segments_s": [[float(start), float(end)] for start, end in given.get("quiet_s", ())],
+        "quiet_segments_s": [_stretch(stretch) for stretch in given.get("quiet_s") or ()],
         "best_effort": bool(given.get("best_effort", False)),
     }
     noise_std_k = given.get("noise_std_k")
     if noise_std_k is not None:
         if not hasattr(noise_std_k, "__len__") or len(noise_std_k) != 2:
             raise ValueError(f"noise_std_k: expected the levels of both sensors, K, got {noise_std_k!r}")
-        options["noise_std_k"] = [float(level) for level in noise_std_k]
+        options["noise_std_k"] = [finite(level, "noise_std_k") for level in noise_std_k]
     chosen = {name: value for name, value in given.items() if value is not None}
-    as_they_are = ("noise_ratio", "noise_colour", "estimator", "optimiser", "hold", "intervals", "discard")
+    as_they_are = ("noise_colour", "estimator", "optimiser", "hold", "intervals", "discard")
     options.update({name: chosen[name] for name in as_they_are if name in chosen})
+    if "noise_ratio" in chosen:
+        options["noise_ratio"] = finite(chosen["noise_ratio"], "noise_ratio")
     of_bootstrap = {name: chosen[name] for name in ("replicates", "seed") if name in chosen}
     if options.get("intervals") == "bootstrap":
         options["intervals"] = {"bootstrap": of_bootstrap}
@@ -95,13 +98,20 @@ def _options(channels: tuple[str, str], **given: Unpack[Options]) -> dict[str, A
     return options
 
 
+def _stretch(stretch: Any) -> list[float]:
+    """A stretch of time, s."""
+    if not hasattr(stretch, "__len__") or len(stretch) != 2:
+        raise ValueError(f"quiet_s: expected stretches (from, to), s, as [(0, 2.5)], got {stretch!r}")
+    return [finite(end, "quiet_s") for end in stretch]
+
+
 def _places(channels: tuple[str, str]) -> dict[str, int]:
-    """Whether a name is that of the first sensor, 0, or of the second, 1."""
-    return dict(zip((*channels, "T1", "T2"), (0, 1, 0, 1)))
+    """Whether a name is that of the first sensor, 0, or of the second, 1; the record's own names go before `T1` and `T2`."""
+    return dict(zip(("T1", "T2", *channels), (0, 1, 0, 1)))
 
 
-def _names(names: Iterable[str]) -> tuple[str, ...]:
-    return (names,) if isinstance(names, str) else tuple(names)
+def _names(names: Iterable[str] | None) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names or ())
 
 
 def _expect(names: tuple[str, ...], allowed: tuple[str, ...], argument: str) -> None:
@@ -123,14 +133,15 @@ def _known(name: str, value: Value, channels: tuple[str, str]) -> str:
     for channel, number in zip(channels, ("T1", "T2")):
         if name == channel or name.startswith(channel + "."):
             name = number + name[len(channel) :]
-    if isinstance(value, bool):
-        raise TypeError(f"known: expected a number for {name!r}, got {value!r}")
+            break
     if isinstance(value, str):
         return f"{name}={value}"
     if isinstance(value, (tuple, list)):
-        mean, deviation = value
-        return f"{name}={float(mean)!r}+-{float(deviation)!r}"
-    return f"{name}={float(value)!r}"
+        if len(value) != 2:
+            raise ValueError(f"known: expected a number for {name!r}, or it and its standard deviation, got {value!r}")
+        mean, deviation = (finite(part, f"known {name!r}") for part in value)
+        return f"{name}={mean!r}+-{deviation!r}"
+    return f"{name}={finite(value, f'known {name!r}')!r}"
 
 
 def _records(record: Record | Iterable[Record]) -> list[Record]:
@@ -153,6 +164,8 @@ def _asked(options: dict[str, Any], **others: Any) -> str:
 
 
 def _fields(model: Model | None) -> dict[str, Any] | None:
+    if model is not None and not isinstance(model, Model):
+        raise TypeError(f"model: expected a twinlag.Model, got {model!r}; load_model reads one from a file")
     return None if model is None else model._fields
 
 
@@ -256,7 +269,7 @@ def compensate(
     *,
     model: Model | None = None,
     form: str | int = "smoother",
-    trust: str = "T1",
+    trust: str | None = None,
     without: Iterable[str] = (),
     progress: Any = None,
     **options: Unpack[Options],
@@ -271,8 +284,8 @@ def compensate(
         A model of another record of the rig; found by a diagnosis if left out.
     form : {"smoother", "filter"} or int
         Which readings the answer for an instant rests on: all, those up to it, or those up to so many samples later.
-    trust : str
-        The sensor that is taken to be right where gain, offset or delay differ.
+    trust : str, optional
+        The sensor that is taken to be right where gain, offset or delay differ; the first one if left out.
     without, known, noise_std_k, noise_ratio, quiet_s, best_effort, progress
         As of `diagnose`.
 
@@ -292,9 +305,10 @@ def compensate(
     """
     record = _one(record)
     sensors = _places(record.channels)
-    _expect((trust,), tuple(sensors), "trust")
+    trusted = record.channels[0] if trust is None else trust
+    _expect((trusted,), tuple(sensors), "trust")
     its_form: Any = {"fixed-lag": int(form)} if isinstance(form, int) else form
-    others = {"model": _fields(model), "form": its_form, "trusted": sensors[trust], "without": list(_names(without))}
+    others = {"model": _fields(model), "form": its_form, "trusted": sensors[trusted], "without": list(_names(without))}
     asked = _asked(_options(record.channels, **options), **others)
     with shown(progress) as report:
         core = _core.compensate(record._inner, asked, report)
@@ -323,7 +337,8 @@ def track(
         As of `characterise`.
     """
     record = _one(record)
-    asked = _asked(_options(record.channels, **options), model=_fields(model), window_s=window_s)
+    its_window_s = None if window_s is None else finite(window_s, "window_s")
+    asked = _asked(_options(record.channels, **options), model=_fields(model), window_s=its_window_s)
     with shown(progress) as report:
         core = _core.track(record._inner, asked, report)
     return Track._of(core)  # type: ignore[no-any-return]
