@@ -26,10 +26,12 @@ def finite(value: Any, name: str) -> float:
     2.0
     """
     try:
-        number = float(value)
+        number = None if isinstance(value, bool) else float(value)
     except (TypeError, ValueError):
-        raise TypeError(f"{name}: expected a number, got {value!r}") from None
-    if isinstance(value, bool) or not math.isfinite(number):
+        number = None
+    if number is None:
+        raise TypeError(f"{name}: expected a number, got {value!r}")
+    if not math.isfinite(number):
         raise ValueError(f"{name}: expected a finite number, got {value!r}")
     return number
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from os import PathLike
 from typing import Any, Final, SupportsFloat, SupportsIndex, final
 
-__all__ = ["TEMPERATURE_RANGE_C", "VERSION", "Answer", "Live", "Record", "characterise", "compensate", "diagnose", "run_program", "simulate", "track"]
+__all__ = ["TEMPERATURE_RANGE_C", "VERSION", "Answer", "Live", "Record", "characterise", "check_model", "compensate", "diagnose", "run_program", "simulate", "track"]
 
 TEMPERATURE_RANGE_C: Final[tuple[float, float]]
 """
@@ -71,10 +71,20 @@ class Record:
         """
         Names of the two sensors.
         """
+    @property
+    def flow(self, /) -> NDArray[float64] | None:
+        """
+        The flow in the unit of its column, if there is one.
+        """
     @staticmethod
     def from_columns(source: str, columns: SupportsGetItem[int, tuple[str, str, Incomplete | SupportsGetItem[int, str]]], selection: str) -> Record:
         """
         A record of columns: name, unit and array of each.
+        """
+    @property
+    def is_irregular(self, /) -> bool:
+        """
+        Whether samples are taken to be where their stamps are, uneven ones.
         """
     @property
     def missing(self, /) -> int:
@@ -107,6 +117,11 @@ class Record:
         What it is called in messages.
         """
     @property
+    def speed_m_s(self, /) -> NDArray[float64] | None:
+        """
+        The speed of sensors that move, m/s, if their position is known.
+        """
+    @property
     def t1_c(self, /) -> NDArray[float64]:
         """
         Readings of the first sensor, °C; NaN where one is missing.
@@ -125,6 +140,11 @@ class Record:
 def characterise(records: SupportsGetItem[int, Record], asked: str, progress: Any | None = None) -> Answer:
     """
     Estimates both time constants of a record, or of several of one rig.
+    """
+
+def check_model(text: str) -> None:
+    """
+    Fails where a text is no model that this version reads.
     """
 
 def compensate(record: Record, asked: str, progress: Any | None = None) -> Answer:

@@ -221,7 +221,7 @@ class Record:
     def __reduce__(self) -> Any:
         if self.speed_m_s is not None:
             raise TypeError("a record with a position keeps the speed alone and cannot be pickled: pickle what it was made of")
-        state = {
+        state: dict[str, Any] = {
             "names": self.channels,
             "reference": self.reference_c,
             "flow": self.flow,
@@ -316,8 +316,8 @@ def _columns_of(frame: Any) -> list[Column]:
     if hasattr(frame, "data_vars"):
         return _columns_of_dataset(frame)
     if not hasattr(frame, "columns") or not hasattr(frame, "__getitem__") or hasattr(frame, "collect"):
-        kind = type(frame).__name__
-        raise TypeError(f"expected a data frame of pandas or polars, or a dataset of xarray, got {kind}; Record takes arrays")
+        got = type(frame).__name__
+        raise TypeError(f"expected a data frame of pandas or polars, or a dataset of xarray, got {got}; Record takes arrays")
     columns: list[Column] = []
     index = getattr(frame, "index", None)
     if index is not None and not callable(index):
