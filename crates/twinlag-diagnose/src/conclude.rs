@@ -49,8 +49,7 @@ pub(crate) fn conclude(
     let twins: Vec<_> = places.map(|index| exact_twins(index, &with_effects, covariance, &settings.effects)).collect();
     let whole_forms = WholeForm::each(&with_effects, &last, &state.prepared);
     let ties = whole_ties(&state, &with_effects, &twins, &whole_forms);
-    let [one, two] = &mut last.time_constants;
-    let (remark, causes) = widen([one, two, &mut last.difference], &ties, policy);
+    let (remark, causes) = widen(&mut last.time_constants, &mut last.difference, &ties, policy);
     remarks.extend(remark);
     let mut found = found(&state, twins.into_iter().zip(first_states), (&with_effects, &last));
     for (_, found) in found.iter_mut().filter(|(place, _)| place.is_some()) {

@@ -135,15 +135,16 @@ impl Tie {
     }
 }
 
-/// Widens the intervals of `numbers`, both time constants and their difference, so that they hold whichever of the tied effects is
+/// Widens the intervals of both time constants and of their difference, so that they hold whichever of the tied effects is
 /// the right one; returns what to say of that, and with which effect alone, in its channel, each of them was right before.
 pub(crate) fn widen(
-    numbers: [&mut TimeConstant; 3],
+    [one, two]: &mut [TimeConstant; 2],
+    difference: &mut TimeConstant,
     ties: &[Tie],
     policy: &Policy,
 ) -> (Option<Remark>, [Option<EffectInChannel>; 3]) {
     let (mut effects, mut causes) = (Vec::new(), [None; 3]);
-    for (i, number) in numbers.into_iter().enumerate() {
+    for (i, number) in [one, two, difference].into_iter().enumerate() {
         let Some([low, high]) = number.interval_95_s else { continue };
         for Tie { named, other, numbers, .. } in ties {
             let Some(Estimate { value, standard_error, interval_95 }) = &numbers[i] else { continue };
@@ -210,11 +211,11 @@ mod tests {
             is_inside_bounds: true,
         };
         let found = |ties: &[Tie]| {
-            let mut numbers = [TimeConstant::default(); 3];
+            let mut numbers = [TimeConstant::default(); 2];
             for (number, value) in numbers.iter_mut().zip([1.0, 3.0]) {
                 number.interval_95_s = Some([0.98 * value, 1.02 * value]);
             }
-            let (_, causes) = widen(numbers.each_mut(), ties, &Policy::default());
+            let (_, causes) = widen(&mut numbers, &mut TimeConstant::default(), ties, &Policy::default());
             (causes, numbers[0].interval_95_s)
         };
         let second_lag = (Identifier::SECOND_ORDER, Some(0));

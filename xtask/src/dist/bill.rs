@@ -1,4 +1,4 @@
-//! The bill of materials of the program: every package that it is compiled from, in the form of CycloneDX 1.5.
+//! The bill of materials of the program: every package that it is compiled from, in the form of `CycloneDX` 1.5.
 //!
 //! It has no date and no serial number, so that it is the same to the byte whenever the sources are.
 
