@@ -19,6 +19,8 @@ pub enum CostError {
     UnevenSampling,
     #[error("{name} must be finite and positive, got {value}")]
     NotPositive { name: &'static str, value: f64 },
+    #[error("{name} must be from 1e-76 to 1e76, got {value}: its fourth power has to be a number of full precision")]
+    OutOfRange { name: &'static str, value: f64 },
     #[error("uneven sampling needs the zero-order hold or the bilinear rule: the others look further than one step")]
     HoldNeedsEvenSampling,
     #[error("a band-limited gas has no difference equation to whiten: choose a hold")]

@@ -54,7 +54,10 @@ pub(crate) fn row<const P: usize>(model: &HoldAndNoise, pair: &Pair<DualSVec64<P
     }
     // Each filter is scaled by its own sum: the sums are equal where the numerators are part of
     // them, and the scale of a one-step filter is that of its own sensor alone.
-    let white = [s1.denominator.times(&b2), s2.denominator.times(&b1)].map(|c| c.scaled(c.sum().recip()));
+    let scaled = |sensor: &Sensor<DualSVec64<P>>, other: &Polynomial<_>| {
+        sensor.denominator.times(other).scaled((sensor.at_rest * other.sum()).recip())
+    };
+    let white = [scaled(&s1, &b2), scaled(&s2, &b1)];
     let white = [white[0], white[1].scaled(pair.gain.recip())];
     if model.is_white() {
         return Row { data: white, noise: white };
@@ -70,6 +73,9 @@ pub(crate) fn row<const P: usize>(model: &HoldAndNoise, pair: &Pair<DualSVec64<P
 struct Sensor<D> {
     numerator: Polynomial<D>,
     denominator: Polynomial<D>,
+    /// The sum of the denominator, as that of the whole numerator, which equals it at unit gain: `1 − a` has lost the digits of `a` that
+    /// `Ts/τ` is small by.
+    at_rest: D,
     is_second: bool,
 }
 
@@ -83,7 +89,8 @@ impl<D: DualNum<Primitive = f64> + Copy> Sensor<D> {
                 Discretisation::FirstOrderHold => backwards(&c.numerator),
                 _ => backwards(&c.numerator[1..]),
             };
-            return Self { numerator, denominator: backwards(&c.denominator), is_second: false };
+            let at_rest = c.numerator[0] + c.numerator[1];
+            return Self { numerator, denominator: backwards(&c.denominator), at_rest, is_second: false };
         };
         let c = hold.second_order(tau_s, second, step_s).expect(known);
         let numerator = match hold {
@@ -91,6 +98,7 @@ impl<D: DualNum<Primitive = f64> + Copy> Sensor<D> {
             Discretisation::Bilinear => backwards(&[c.numerator[0], c.numerator[0]]),
             _ => backwards(&c.numerator[1..]),
         };
-        Self { numerator, denominator: backwards(&c.denominator), is_second: true }
+        let at_rest = c.numerator.iter().fold(D::from(0.0), |sum, part| sum + *part);
+        Self { numerator, denominator: backwards(&c.denominator), at_rest, is_second: true }
     }
 }

@@ -45,12 +45,19 @@ impl HoldAndNoise {
     }
 }
 
-/// Refuses standard deviations that are not positive.
+/// Refuses standard deviations that are not positive, and those whose fourth power, by which derivatives of costs divide, overflows or
+/// underflows.
 pub(crate) fn check_noise(noise_std: [f64; 2]) -> Result<(), CostError> {
-    match noise_std.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
-        Some(&value) => Err(CostError::NotPositive { name: "noise standard deviation", value }),
-        None => Ok(()),
+    let name = "noise standard deviation";
+    for value in noise_std {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(CostError::NotPositive { name, value });
+        }
+        if !value.powi(4).is_normal() {
+            return Err(CostError::OutOfRange { name, value });
+        }
     }
+    Ok(())
 }
 
 /// Refuses noise that is not stationary, or of an order above 2.
