@@ -172,7 +172,7 @@ pub(crate) fn last_fit(state: &State<'_>, policy: &Policy) -> (Fitted, ModelFit,
 
 /// What is left over beside the noise, where intervals can cover it.
 fn bounded_excess(state: &State<'_>, fitted: &Fitted, fit: &ModelFit, policy: &Policy) -> Option<Excess> {
-    let is_bounded = |excess: &Excess| excess.share <= policy.explained_excess_share && state.rapid.is_none();
+    let is_bounded = |excess: &Excess| excess.is_bounded(policy) && state.rapid.is_none();
     excess(fit, fitted.model.noise().is_some()).filter(is_bounded)
 }
 

@@ -638,7 +638,7 @@ impl Basis {
     /// - `excess`: what it leaves over beside noise; `None` where nothing says what the noise is
     /// - `is_bounded_otherwise`: whether a number holds without the rest of the model, or knowledge holds it
     pub fn of(excess: Option<Excess>, is_bounded_otherwise: bool, policy: &Policy) -> Self {
-        match excess.filter(|excess| excess.share <= policy.explained_excess_share) {
+        match excess.filter(|excess| excess.is_bounded(policy)) {
             Some(Excess { share, energy }) if share > 0.0 => {
                 Self { reasons: vec![Reason::LeavesSome { share }], excess_energy: energy }
             }
@@ -794,6 +794,13 @@ pub struct Excess {
     pub energy: f64,
     /// Its energy, over that of the noise of all residuals.
     pub share: f64,
+}
+
+impl Excess {
+    /// Whether it is so small a share of the noise that intervals cover what it may do to the numbers.
+    pub fn is_bounded(&self, policy: &Policy) -> bool {
+        self.share <= policy.explained_excess_share
+    }
 }
 
 /// What `fit` leaves over beside noise; `None` where nothing but the residual says what the noise is.

@@ -4,10 +4,9 @@ use twinlag_diagnose::{Instants, KnownTimeConstant, Masked, Observations, Settin
 use twinlag_model::FlowKind;
 use twinlag_record::{Grid, Record};
 
-use twinlag_cross_relation::Parameter;
-
 use crate::error::Error;
 use crate::options::Options;
+use crate::verbs::sensor_of;
 
 /// Samples of a stretch below which it is left out.
 const MIN_STRETCH_SAMPLES: usize = 8;
@@ -128,13 +127,8 @@ pub(crate) fn check_flow(observations: &Observations, records: &[Record]) -> Res
 
 /// What the options say of noise and time constants beforehand, as settings of a diagnosis.
 pub(crate) fn settings_of(options: &Options) -> Settings {
-    let known = options.known.iter().filter_map(|k| {
-        let sensor = match k.parameter {
-            Parameter::Tau1 => 0,
-            Parameter::Tau2 => 1,
-            _ => return None,
-        };
-        Some(KnownTimeConstant { sensor, value_s: k.value, std_s: k.std })
+    let known = options.known.iter().filter_map(|known| {
+        Some(KnownTimeConstant { sensor: sensor_of(known)?, value_s: known.value, std_s: known.std })
     });
     Settings { noise_std_k: options.noise_std_k, known: known.collect(), ..Settings::default() }
 }

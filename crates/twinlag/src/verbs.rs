@@ -5,6 +5,7 @@ mod characterise_records;
 mod compensate;
 mod diagnose;
 mod diagnose_records;
+mod given;
 mod inspect;
 mod live;
 mod several;
@@ -23,6 +24,8 @@ pub use live::{Live, LiveAnswer, LiveOptions};
 pub use several::joined;
 pub use track::{TrackOptions, track, track_watched};
 pub use with_model::characterise_with;
+
+pub(crate) use given::sensor_of;
 
 /// The judgement of what follows from both time constants.
 fn following_both(channels: &[String; 2], judgements: [&Judgement; 2]) -> Judgement {

@@ -9,7 +9,7 @@ use crate::bands::{Banded, GasFault, Reconstruction, median};
 use crate::error::Error;
 use crate::reference::Reference;
 use crate::rows::RowOfSample;
-use crate::verbs::diagnose::{DiagnoseOptions, Diagnosed, named, with_effects};
+use crate::verbs::diagnose::{DiagnoseOptions, Diagnosed, named, remark_on_options, with_effects};
 use crate::verbs::following_both;
 use crate::verbs::with_model::with_model;
 use crate::watch::{Stop, UNWATCHED, Watch};
@@ -210,12 +210,14 @@ impl Modelled {
         let place = |masked: &mut Masked| rows.place(masked, record);
         let effects = named(record, &core, place, options.diagnose.characterise.best_effort);
         let last = with_effects(record, &options.diagnose, &core, &effects);
+        let unused = remark_on_options(&options.diagnose.characterise, "a diagnosis");
+        let warnings = core.remarks.iter().map(ToString::to_string).chain(unused).collect();
         Ok(Self {
             model: Model::found(&core, &last, None),
             last,
             verdict: Some(core.verdict),
             effects,
-            warnings: core.remarks.iter().map(ToString::to_string).collect(),
+            warnings,
             fit: without_trace(core.last),
         })
     }

@@ -1,6 +1,5 @@
 //! The closed loop on a record.
 
-use twinlag_cross_relation::Parameter;
 use twinlag_diagnose::{
     Diagnosis as Core, Identifier, Judgements, Masked, ModelFit, Policy, Remark, Settings, Verdict,
     diagnose as close_the_loop,
@@ -17,6 +16,7 @@ use crate::options::Options;
 use crate::reference::Reference;
 use crate::rows::{Rows, check_flow, settings_of};
 use crate::setting::{Setting, listed};
+use crate::verbs::sensor_of;
 use crate::watch::{UNWATCHED, Watch};
 
 /// What a diagnosis may assume.
@@ -87,7 +87,7 @@ pub(crate) fn answer(
 ) -> Diagnosis {
     let mut remarks: Vec<String> = core.remarks.iter().map(ToString::to_string).collect();
     remarks.extend(remark_on_reference(&error));
-    remarks.extend(remark_on_options(&options.characterise));
+    remarks.extend(remark_on_options(&options.characterise, "a diagnosis"));
     let named = named(record, &core, place, options.characterise.best_effort);
     Diagnosis {
         schema: Diagnosis::SCHEMA.into(),
@@ -222,7 +222,6 @@ fn remark_on_reference(error: &ErrorBeforeAfter) -> Option<String> {
 
 /// What was asked of the two-lag model that the loop does not use.
 pub(super) fn unused(options: &Options) -> Vec<Setting> {
-    let is_time_constant = |p: Parameter| matches!(p, Parameter::Tau1 | Parameter::Tau2);
     let asked = [
         (options.estimator != Options::default().estimator, Setting::Estimator),
         (options.optimiser != Options::default().optimiser, Setting::Optimiser),
@@ -232,19 +231,20 @@ pub(super) fn unused(options: &Options) -> Vec<Setting> {
         (options.noise_colour != Options::default().noise_colour, Setting::NoiseColour),
         (options.free_gain || options.free_offset, Setting::Free),
         (options.second_order != [false; 2], Setting::SecondOrder),
-        (options.known.iter().any(|k| !is_time_constant(k.parameter)), Setting::Known),
+        (options.known.iter().any(|known| sensor_of(known).is_none()), Setting::Known),
         (options.discard.is_some(), Setting::Discard),
         (options.intervals != Intervals::Auto, Setting::Intervals),
     ];
     asked.into_iter().filter_map(|(is_asked, what)| is_asked.then_some(what)).collect()
 }
 
-fn remark_on_options(options: &Options) -> Option<String> {
+/// A remark on the options that `what` does not use; `None` where it uses all.
+pub(super) fn remark_on_options(options: &Options, what: &str) -> Option<String> {
     let unused = unused(options);
     (!unused.is_empty()).then(|| {
         format!(
-            "a diagnosis uses the noise levels and the time constants that are given, and nothing else that is asked of \
-             a characterisation: not used here: {}",
+            "{what} uses the noise levels and the time constants that are given, and nothing else that is asked of a \
+             characterisation: not used here: {}",
             listed(&unused)
         )
     })

@@ -1,9 +1,10 @@
 //! A record with the effects of a model: held where it was found in another one, and fitted again in its own.
 
 use twinlag_diagnose::{
-    Basis, Circumstances, Identifier, ModelFit, Observations, Reason, Remark, Settings, excess, fit_again_with,
-    fit_with, is_single_tone,
+    Basis, Circumstances, Grade, Identifier, ModelFit, Observations, Policy, Reason, Remark, Settings, excess,
+    fit_again_with, fit_with, is_single_tone,
 };
+use twinlag_estimate::Known;
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, FittedAnswer, Model, Status, rounded};
@@ -11,6 +12,8 @@ use crate::error::Error;
 use crate::options::Options;
 use crate::rows::{Rows, settings_of};
 use crate::verbs::characterise;
+use crate::verbs::diagnose::remark_on_options;
+use crate::verbs::given::{Contradiction, sensor_of};
 
 /// Relative difference of two mean flows that a reader has to know of: with the root of the flow, time constants differ by half as much.
 /// Chosen.
@@ -63,10 +66,17 @@ pub(crate) fn with_model(
     let fit = if is_own { fit_again_with } else { fit_with };
     let mut known = fit(&observations, &settings, &effects)?;
     let policy = &settings.policy;
+    let contradictions = if settings.known.is_empty() {
+        Vec::new()
+    } else {
+        let alone = fit(&observations, &Settings { known: Vec::new(), ..settings.clone() }, &effects)?.fit;
+        contradictions(&options.known, &alone, noisy.is_some(), policy)
+    };
     let excess = excess(&known.fit, noisy.is_some());
     let mut basis = Basis::of(excess, !settings.known.is_empty(), policy);
     let reasons = model.map_or_else(Vec::new, |model| model.reasons(record, &known.fitted_again));
     basis.reasons.extend(reasons.iter().cloned());
+    basis.reasons.extend(contradictions.iter().map(|contradiction| contradiction.reason.clone()));
     let is_single_tone = is_single_tone(&observations, policy);
     if is_single_tone {
         basis.reasons.push(Reason::SingleTone);
@@ -82,7 +92,7 @@ pub(crate) fn with_model(
         is_total_delay: false,
         judgements,
     };
-    let is_explained = excess.is_some_and(|excess| excess.share <= policy.explained_excess_share);
+    let is_explained = excess.is_some_and(|excess| excess.is_bounded(policy));
     let status = match (fitted.is_determined(), is_explained) {
         (false, _) => Status::NotIdentifiable,
         (true, false) => Status::ModelRejected,
@@ -103,19 +113,33 @@ pub(crate) fn with_model(
             "effects held at the values of the model: {names}. The intervals do not cover the uncertainty of these values"
         ));
     }
+    let otherwise = match model {
+        Some(_) => "the model is not that of these sensors",
+        None => "an effect is missing: a diagnosis looks for one",
+    };
+    out.warnings.extend(contradictions.iter().map(|contradiction| format!("{}. Or {otherwise}", contradiction.remark)));
     out.warnings.extend(model.and_then(|model| at_other_flow(model, &observations)));
     if !known.fitted_again.is_empty() && !is_own {
         let again = listed(&mut known.fitted_again.iter().copied());
         out.warnings.push(format!("effects fitted again, because they belong to a record and not to the rig: {again}"));
     }
-    if options.free_gain || options.free_offset || options.second_order != [false; 2] {
-        out.warnings.push(
-            "the request to fit gain, offset or second lags is ignored, because the model \
-                   determines what is fitted"
-                .into(),
-        );
-    }
+    out.warnings.extend(remark_on_options(options, "a fit with a model"));
     Ok((out, known.fit))
+}
+
+/// Contradictions between the time constants that were given and those of `alone`, a fit without them. There are none where `alone`
+/// leaves more than intervals cover: what is missing may account for the difference. Where it leaves less than that, but more than
+/// noise, numbers are at best conditional.
+fn contradictions(given: &[Known], alone: &ModelFit, has_noise: bool, policy: &Policy) -> Vec<Contradiction> {
+    if !excess(alone, has_noise).is_some_and(|excess| excess.is_bounded(policy)) {
+        return Vec::new();
+    }
+    let grade = if alone.is_contradicted() { Grade::Conditional } else { Grade::NoGo };
+    let of = |known: &Known| {
+        let own = &alone.time_constants[sensor_of(known)?];
+        Contradiction::of(known, own.value_s?, own.standard_error_s?, grade)
+    };
+    given.iter().filter_map(of).collect()
 }
 
 /// At which flow the numbers of a model hold, where that is not the mean flow of the record.

@@ -2,6 +2,7 @@
 
 use crate::common::{read, record};
 use twinlag::diagnosis::Grade;
+use twinlag::record::Record;
 use twinlag::signal::undeclared::{GasKind, Kind, undeclared};
 use twinlag::{CompensateOptions, DiagnoseOptions, Model, compensate, diagnose};
 
@@ -47,13 +48,18 @@ fn a_gas_temperature_rests_on_the_sensor_that_is_trusted() {
     }
 }
 
+/// Two lags of 7.4 and 28 s in turbulence.
+fn two_lags() -> Record {
+    let gas = "kind = \"turbulence\"\nstd_k = 40.0\ncorner_hz = 0.01\ncutoff_hz = 0.15";
+    let sensors = [7.4, 28.0].map(|tau_s| format!("time_constant_s = {tau_s}\nnoise = {{ std_k = 0.25 }}"));
+    record(5, 1000, 1.0, gas, [&sensors[0], &sensors[1]])
+}
+
 /// Failed: fitted again to the record that it was found in, a model without effects made of conditional time constants ones that are go, and
 /// the gas temperature with them.
 #[test]
 fn a_model_of_its_own_record_is_no_surer_than_the_diagnosis_was() {
-    let gas = "kind = \"turbulence\"\nstd_k = 40.0\ncorner_hz = 0.01\ncutoff_hz = 0.15";
-    let sensors = [7.4, 28.0].map(|tau_s| format!("time_constant_s = {tau_s}\nnoise = {{ std_k = 0.25 }}"));
-    let record = record(5, 1000, 1.0, gas, [&sensors[0], &sensors[1]]);
+    let record = two_lags();
     let mut model = diagnose(&record, &DiagnoseOptions::default()).expect("a sound question").model();
     assert!(model.effects.is_empty(), "{:?}", model.effects);
     let judged = |model: &Model| {
@@ -66,4 +72,38 @@ fn a_model_of_its_own_record_is_no_surer_than_the_diagnosis_was() {
     let judgement = judged(&model);
     assert_eq!(judgement.grade, Grade::Conditional, "{judgement:?}");
     assert!(judgement.because.contains("no delay of a usual size"), "{judgement:?}");
+}
+
+/// Failed: with a model, a time constant that was given is not compared with that of the record, and the gas temperature that rests on one
+/// of 0.5 s in place of 7.4 s was conditional.
+#[test]
+fn a_wrong_time_constant_beside_a_model_is_contradicted() {
+    let record = two_lags();
+    let model = Some(Model::of_two_lags(record.channels.clone()));
+    let with = |known: &str| {
+        let mut options = CompensateOptions { model: model.clone(), ..CompensateOptions::default() };
+        options.diagnose.characterise.known = vec![known.parse().expect("a known value")];
+        compensate(&record, &options).expect("a sound question")
+    };
+    assert_eq!(with("T1=7.4s").judgement.grade, Grade::Conditional);
+    for wrong in ["T1=0.5s", "T1=0.5s+-0.1s"] {
+        let answer = with(wrong);
+        assert!(answer.gas_c.is_empty() && answer.judgement.grade == Grade::NoGo, "{wrong}: {:?}", answer.judgement);
+        assert!(answer.judgement.because.contains("contradicts"), "{wrong}: {:?}", answer.judgement);
+    }
+}
+
+/// Failed: what a compensation does not use of a characterisation was passed over in silence.
+#[test]
+fn a_compensation_names_the_options_that_it_does_not_use() {
+    let record = two_lags();
+    for (model, what) in
+        [(None, "a diagnosis"), (Some(Model::of_two_lags(record.channels.clone())), "a fit with a model")]
+    {
+        let mut options = CompensateOptions { model, ..CompensateOptions::default() };
+        options.diagnose.characterise.second_order = [true, false];
+        let answer = compensate(&record, &options).expect("a sound question");
+        let is_said = |warning: &String| warning.starts_with(what) && warning.ends_with("not used here: second lags");
+        assert!(answer.warnings.iter().any(is_said), "{:?}", answer.warnings);
+    }
 }

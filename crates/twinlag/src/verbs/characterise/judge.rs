@@ -2,10 +2,11 @@
 
 use twinlag_cross_relation::{Influences, PartScatter, sandwich};
 use twinlag_diagnose::{Basis, Grade, Judgement, Number, Policy, Reason};
-use twinlag_estimate::{Estimator, Known, REJECTION_P_VALUE};
+use twinlag_estimate::{Estimator, REJECTION_P_VALUE};
 
 use super::conclude::Conclusion;
 use crate::answers::{Characterisation, Status};
+use crate::verbs::given::given;
 
 impl<const P: usize> Conclusion<'_, '_, P> {
     /// Grades every number of `out`, and widens its interval to what it has to cover.
@@ -89,14 +90,6 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let time_s = &self.asked.record.time_s;
         time_s.last().zip(time_s.first()).map_or(0.0, |(last, first)| last - first)
     }
-}
-
-/// What was given, for the reader.
-pub(super) fn given(known: &Known) -> String {
-    let spread = known.std.map_or(String::new(), |std| format!(" ± {std}"));
-    let name = known.name();
-    let (name, unit) = name.strip_suffix(".time_constant_s").map_or((name, ""), |sensor| (sensor, " s"));
-    format!("{name} = {}{spread}{unit}", known.value)
 }
 
 /// What each residual does to the parameters.
