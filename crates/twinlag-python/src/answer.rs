@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use twinlag::record::Record as Inner;
-use twinlag::{Characterisation, Compensation, Diagnosis, Track, joined};
+use twinlag::{Characterisation, Compensation, Diagnosis, Track, joined, rows_of_samples};
 use twinlag_pages::{Making, diagnosis_report, gas_report, track_report};
 
 use crate::column::Column;
@@ -80,6 +80,38 @@ impl Answer {
                 series
             }
         }
+    }
+
+    /// For each row of the record the index of its sample in the series, from 0; `None` where it has none. Fails for a series that has other
+    /// instants than the record.
+    fn samples_of_rows(&self) -> PyResult<Vec<Option<usize>>> {
+        let count = match &self.said {
+            Said::Characterisation(_) | Said::Diagnosis(_) => 0,
+            Said::Compensation(answer) => answer.time_s.len(),
+            Said::Track(answer) => answer.time_s.len(),
+        };
+        let record = self.record()?;
+        let mut samples = vec![None; record.len()];
+        if count == 0 {
+            return Ok(samples);
+        }
+        let rows = rows_of_samples(&record);
+        if rows.len() != count {
+            let what = "index: the series is one of windows, not of the rows of the record; leave the index out";
+            return Err(PyValueError::new_err(what));
+        }
+        // The sample and the row after the last pair that is known.
+        let mut next = (0, 0);
+        for (sample, row) in rows.into_iter().enumerate().filter_map(|(sample, row)| Some((sample, row?))) {
+            // A gap of missing readings alone has as many samples as rows. Where rows are absent as well, which sample a row is would take
+            // its stamp: its rows stay `None`.
+            if sample - next.0 == row - next.1 {
+                (next.1..row).zip(next.0..).for_each(|(row, sample)| samples[row] = Some(sample));
+            }
+            samples[row] = Some(sample);
+            next = (sample + 1, row + 1);
+        }
+        Ok(samples)
     }
 
     /// The model that the answer rests on, as JSON; `None` where there is none.

@@ -212,9 +212,46 @@ def test_a_model_of_another_schema_is_refused(diagnosis, tmp_path) -> None:
         {"known": {"T1": (0.1,)}},
         {"quiet_s": (0, 1)},
         {"quiet_s": [(0, np.nan)]},
+        {"discard": -1},
+        {"discard": 2.5},
+        {"intervals": "bootstrap", "seed": True},
+        {"estimator": 5},
+        {"hold": ["auto"]},
     ],
 )
-def test_options_that_are_no_numbers_are_named(rig, options) -> None:
-    with pytest.raises(ValueError, match=next(iter(options))):
+def test_options_that_are_not_what_they_have_to_be_are_named(rig, options) -> None:
+    with pytest.raises((TypeError, ValueError), match=rf"^{list(options)[-1]}\b"):
         tl.characterise(rig, **options)
     assert tl.characterise(rig, free=None, second_order=None, noise_ratio=np.float32(1.0)).ok
+
+
+def test_series_go_to_the_rows_of_a_frame(rig) -> None:
+    pd = pytest.importorskip("pandas")
+    index = pd.date_range("2026-01-31", periods=len(rig), freq="2ms", name="time")
+    readings = pd.DataFrame({"fine_C": rig.t1_c, "coarse_C": rig.t2_c}, index=index)
+    # Rows 700 to 709 were never logged, and a reading of row 300 is missing.
+    readings.iloc[300, 0] = np.nan
+    logged = readings.drop(readings.index[700:710])
+    gas = tl.compensate(tl.Record.from_frame(logged))
+    assert len(gas.gas_c) == len(index)
+    want = np.delete(gas.gas_c, np.arange(700, 710))
+    # Labels of the caller's own, some of them twice, and a column with the name of the program's.
+    twice = logged.assign(time_s=0.0).set_axis(np.arange(len(logged)) // 2)
+    for frame in (logged, twice):
+        beside = pd.concat([frame, gas.to_frame(frame.index)], axis=1)
+        assert np.array_equal(beside["gas_C"], want) and beside.index.equals(frame.index)
+    with pytest.raises(ValueError, match="rows"):
+        gas.to_frame(index)
+
+
+def test_a_track_of_windows_has_no_rows_of_the_record(rig) -> None:
+    pytest.importorskip("pandas")
+    track = tl.track(rig, window_s=1.0)
+    assert len(track.to_frame()) == len(track.time_s)
+    with pytest.raises(ValueError, match="windows"):
+        track.to_frame(range(len(rig)))
+
+
+def test_a_folder_that_is_not_there_is_named(diagnosis, tmp_path) -> None:
+    with pytest.raises(FileNotFoundError, match="no such folder.*nowhere'$"):
+        diagnosis.report(tmp_path / "nowhere" / "page.html")

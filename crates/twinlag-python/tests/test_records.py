@@ -55,6 +55,7 @@ def test_missing_values_are_missing_however_they_are_written(arrays) -> None:
         (np.array([object(), object()], dtype=object), "expected a number"),
         (np.array([1j, 2j]), "expected numbers"),
         (np.array([True, False]), "expected numbers"),
+        (np.array([20.5, True, 21.0], dtype=object), "expected a number, got True in row 2"),
         (np.array(["2026-01-31"], dtype="datetime64[s]"), "expected numbers"),
         (5.0, "shape"),
         (np.zeros(7), "7|length|rows"),
@@ -93,7 +94,10 @@ def test_instants_of_any_kind(arrays) -> None:
     stamps = start + np.arange(len(t1)) * np.timedelta64(2, "ms")
     utc = datetime.timezone(datetime.timedelta(hours=2))
     aware = [datetime.datetime(2026, 1, 31, 12, tzinfo=utc) + datetime.timedelta(milliseconds=2 * k) for k in range(len(t1))]
-    for time in (stamps, stamps.astype("datetime64[ms]"), stamps - start, aware, [str(stamp) for stamp in stamps]):
+    texts = [str(stamp) for stamp in stamps]
+    objects = np.array(texts, dtype=object)
+    objects[-1] = float("nan")  # as pandas has a missing text
+    for time in (stamps, stamps.astype("datetime64[ms]"), stamps - start, aware, texts, objects):
         record = tl.Record(time, t1, t2)
         assert record.sample_period_s == pytest.approx(0.002, rel=1e-9)
         assert record.time_s[0] == 0.0

@@ -262,11 +262,34 @@ class _WithSeries(Answer):
         """``ok``, or ``not-identifiable`` where there is no answer."""
         return self._fields["status"]  # type: ignore[no-any-return]
 
-    def to_frame(self) -> Any:
-        """A pandas data frame of the series, with the instants in s as its index."""
+    def to_frame(self, index: Any = None) -> Any:
+        """A pandas data frame of the series.
+
+        Parameters
+        ----------
+        index : Index, optional
+            The index of the frame that the record is of: the series then has its rows, so that
+            ``pd.concat([frame, answer.to_frame(frame.index)], axis=1)`` puts it beside the readings. Rows without an answer are NaN, and
+            so are rows in which a temperature is missing beside rows that are absent. Without an index it is the instants in s, one for
+            each sample, missing ones among them.
+
+        Raises
+        ------
+        ValueError
+            An index of another length than the record, or a track of windows, which have instants of their own.
+        """
+        import numpy as np
         import pandas as pd
 
-        return pd.DataFrame(self._series).set_index("time_s")
+        frame = pd.DataFrame(self._series)
+        if index is None:
+            return frame.set_index("time_s")
+        samples = self._asked().samples_of_rows()
+        if len(index) != len(samples):
+            raise ValueError(f"index: expected one of the record's {len(samples)} rows, got {len(index)}")
+        placed = frame.drop(columns="time_s").reindex(np.array([-1 if sample is None else sample for sample in samples]))
+        placed.index = index
+        return placed
 
     def _verdict(self) -> str:
         return f"{self.status}, {self.grade}"

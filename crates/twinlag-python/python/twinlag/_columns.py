@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from typing import TYPE_CHECKING, Any
 
 from twinlag._errors import RecordError
@@ -25,15 +26,46 @@ def finite(value: Any, name: str) -> float:
     >>> finite(2, "window_s")
     2.0
     """
-    try:
-        number = None if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
-        number = None
+    number = _number(value)
     if number is None:
         raise TypeError(f"{name}: expected a number, got {value!r}")
     if not math.isfinite(number):
         raise ValueError(f"{name}: expected a finite number, got {value!r}")
     return number
+
+
+def count(value: Any, name: str) -> int:
+    """A whole number from 0, whether of Python or of NumPy.
+
+    >>> count(2, "seed")
+    2
+    """
+    try:
+        whole = None if _is_bool(value) else operator.index(value)
+    except TypeError:
+        whole = None
+    if whole is None:
+        raise TypeError(f"{name}: expected a whole number, got {value!r}")
+    if whole < 0:
+        raise ValueError(f"{name}: expected a whole number from 0, got {value!r}")
+    return whole
+
+
+def _number(value: Any) -> float | None:
+    """The value as a double; ``None`` where it is no number, as true and false are none."""
+    try:
+        return None if _is_bool(value) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _is_bool(value: Any) -> bool:
+    return type(value).__name__ in {"bool", "bool_"}
+
+
+def _is_missing(value: Any) -> bool:
+    """Whether an object stands for a missing value: of Python, NumPy or pandas."""
+    return value is None or type(value).__name__ in {"NAType", "NaTType"} or (isinstance(value, float) and math.isnan(value))
 
 
 def _one_dimensional(values: Any, name: str) -> Any:
@@ -57,27 +89,24 @@ def numbers(values: Any, name: str) -> NDArray[float64]:
     array = _one_dimensional(values, name)
     if array.dtype.kind in "cmMbSUV":
         raise RecordError(f"{name}: expected numbers, got values of type {array.dtype}")
+    if array.dtype == object:
+        return _of_objects(array, name)
     try:
         return np.ascontiguousarray(array, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        if array.dtype == object:
-            return _of_objects(array, name, error)
         raise RecordError(f"{name}: expected numbers, got values of type {array.dtype}") from error
 
 
-def _of_objects(array: Any, name: str, error: Exception) -> NDArray[float64]:
+def _of_objects(array: Any, name: str) -> NDArray[float64]:
     """Doubles of objects, of which some may be missing in one way or another."""
     import numpy as np
 
     out = np.empty(len(array))
     for row, value in enumerate(array):
-        if value is None or type(value).__name__ in {"NAType", "NaTType"}:
-            out[row] = np.nan
-            continue
-        try:
-            out[row] = float(value)
-        except (TypeError, ValueError):
-            raise RecordError(f"{name}: expected a number, got {value!r} in row {row + 1}") from error
+        number = math.nan if _is_missing(value) else _number(value)
+        if number is None:
+            raise RecordError(f"{name}: expected a number, got {value!r} in row {row + 1}")
+        out[row] = number
     return out
 
 
@@ -111,6 +140,11 @@ def times(values: Any, unit: str) -> Column:
         return "time", "s", numbers(array / np.timedelta64(1, "s"), "time")
     if array.dtype.kind in "US":
         return "time", "", [str(cell) for cell in array]
+    if array.dtype == object and any(isinstance(cell, str) for cell in array):
+        others = [cell for cell in array if not isinstance(cell, str) and not _is_missing(cell)]
+        if others:
+            raise RecordError(f"time: expected instants as text, got {others[0]!r} among them")
+        return "time", "", [cell if isinstance(cell, str) else "" for cell in array]
     instants = numbers(array, "time")
     if unit == "s" and len(instants) and abs(instants[0]) > LATEST_STAMP_S:
         raise RecordError(f"time: {instants[0]:.6g} s is no instant that anybody has seen: say what it counts, as time_unit='ms'")

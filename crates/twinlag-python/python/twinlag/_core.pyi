@@ -37,6 +37,11 @@ class Answer:
         """
         The page of the answer, one HTML file, or its first screen; `None` of a characterisation, which has none.
         """
+    def samples_of_rows(self, /) -> list[int | None]:
+        """
+        The sample of the series that each row of the record is, from 0; `None` of a row without one, and of all rows where the series
+        has other instants than the record.
+        """
     def series(self, /) -> list[tuple[str, NDArray[float64] | list[str]]]:
         """
         The series of the answer, each with the name of the column that the program writes; none where it has none.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import stat
@@ -14,6 +15,10 @@ def replace(path: str | os.PathLike[str], text: str) -> None:
     A link is followed. What is no file, such as a pipe, is written in place.
     """
     target = Path(path).resolve()
+    if not target.parent.is_dir():
+        if target.parent.exists():
+            raise NotADirectoryError(errno.ENOTDIR, "this is no folder", str(target.parent))
+        raise FileNotFoundError(errno.ENOENT, "there is no such folder", str(target.parent))
     if target.exists() and not target.is_file():
         target.write_text(text, encoding="utf-8", newline="\n")
         return

@@ -129,7 +129,7 @@ def quantity(fields: Mapping[str, Any], value: str = "time_constant_s", interval
     number, ends, unit = fields[value], fields[interval], fields.get("unit", "s")
     grade = fields["grade"]
     if number is None:
-        return f"not determined, {grade}" if ends is None else f"[{ends[0]:.5g}, {ends[1]:.5g}] {unit} {grade}"
+        return f"not given, {grade}" if ends is None else f"[{ends[0]:.5g}, {ends[1]:.5g}] {unit} {grade}"
     of_unit = f" {unit}" if unit else ""
     within = "" if ends is None else f" [{ends[0]:.5g}, {ends[1]:.5g}]"
     return f"{number:.5g}{of_unit}{within} {grade}"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from twinlag import _core
 from twinlag._answers import Characterisation, Compensation, Diagnosis, Track
-from twinlag._columns import finite
+from twinlag._columns import count, finite
 from twinlag._model import Model
 from twinlag._progress import shown
 from twinlag._record import Record
@@ -41,7 +41,7 @@ class Options(TypedDict, total=False):
     quiet_s: Iterable[tuple[float, float]]
     """Stretches ``(from, to)``, s, in which the gas is at rest."""
     estimator: str
-    optimiser: str
+    optimiser: str | Mapping[str, Any]
     hold: str
     intervals: str
     """``"auto"``, ``"profile"`` or ``"bootstrap"``."""
@@ -86,16 +86,26 @@ def _options(channels: tuple[str, str], **given: Unpack[Options]) -> dict[str, A
             raise ValueError(f"noise_std_k: expected the levels of both sensors, K, got {noise_std_k!r}")
         options["noise_std_k"] = [finite(level, "noise_std_k") for level in noise_std_k]
     chosen = {name: value for name, value in given.items() if value is not None}
-    as_they_are = ("noise_colour", "estimator", "optimiser", "hold", "intervals", "discard")
-    options.update({name: chosen[name] for name in as_they_are if name in chosen})
+    for name in ("noise_colour", "estimator", "optimiser", "hold", "intervals"):
+        if name in chosen:
+            options[name] = _name_of(chosen[name], name)
+    if "discard" in chosen:
+        options["discard"] = count(chosen["discard"], "discard")
     if "noise_ratio" in chosen:
         options["noise_ratio"] = finite(chosen["noise_ratio"], "noise_ratio")
-    of_bootstrap = {name: chosen[name] for name in ("replicates", "seed") if name in chosen}
+    of_bootstrap = {name: count(chosen[name], name) for name in ("replicates", "seed") if name in chosen}
     if options.get("intervals") == "bootstrap":
         options["intervals"] = {"bootstrap": of_bootstrap}
     elif of_bootstrap:
         raise ValueError(f"{' and '.join(of_bootstrap)}: of a bootstrap alone; intervals='bootstrap' asks for one")
     return options
+
+
+def _name_of(value: Any, option: str) -> Any:
+    """A name, or for the optimiser a mapping with its settings, as in a settings file."""
+    if isinstance(value, str) or (option == "optimiser" and isinstance(value, Mapping)):
+        return value
+    raise TypeError(f"{option}: expected a name, got {value!r}")
 
 
 def _stretch(stretch: Any) -> list[float]:
