@@ -1,6 +1,6 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask book`, `cargo xtask experiment`, `cargo xtask measured DIR`,
-//! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask cluster`, `cargo xtask profile`, `cargo xtask report`,
-//! `cargo xtask web`, `cargo xtask python`, `cargo xtask dist`.
+//! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask faults`, `cargo xtask cluster`,
+//! `cargo xtask profile`, `cargo xtask report`, `cargo xtask web`, `cargo xtask python`, `cargo xtask dist`.
 
 mod bench;
 mod book;
@@ -8,6 +8,7 @@ mod ci;
 mod cluster;
 mod dist;
 mod experiment;
+mod faults;
 mod fleet;
 mod measured;
 mod profile;
@@ -72,6 +73,8 @@ enum Task {
     /// Runs a study and a batch on Slurm, `HyperQueue`, GNU parallel and an object store on this machine, and kills nodes: the bytes have to
     /// be the same.
     Cluster(cluster::Cluster),
+    /// Kills the program at moments all over its runs, fills the disk and damages what it keeps: nothing may be lost or half written.
+    Faults(faults::Faults),
     /// Samples where the time of each verb goes, and writes the book's page on it.
     Profile(profile::Profile),
     /// Makes a release archive for a platform, the same to the byte whenever it is made.
@@ -95,6 +98,7 @@ fn main() -> ExitCode {
         Task::Bench(arguments) => bench::run(&arguments),
         Task::Fleet(arguments) => fleet::run(&arguments),
         Task::Cluster(arguments) => cluster::run(&arguments),
+        Task::Faults(arguments) => faults::run(&arguments),
         Task::Profile(arguments) => profile::run(&arguments),
         Task::Python(arguments) => python::run(&arguments),
         Task::Report(arguments) => report::run(&arguments),

@@ -139,8 +139,8 @@ fn assembled(bound: &Path) -> Result<String> {
     let read = |path: PathBuf| fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()));
     let reports = reports()?;
     let style = format!("\n{}{}", reports.style, read(page.join("page.css"))?);
-    let script = read(bound.join(UNPACKER.file(".js")))? + &read(page.join("page.js"))?;
-    let worker = read(bound.join(SESSION.file(".js")))? + &read(page.join("worker.js"))?;
+    let script = without_comments(&(read(bound.join(UNPACKER.file(".js")))? + &read(page.join("page.js"))?))?;
+    let worker = without_comments(&(read(bound.join(SESSION.file(".js")))? + &read(page.join("worker.js"))?))?;
     ensure!(!(worker.clone() + &script).contains("</script"), "a script would end before its end");
     let wasm = Base64::encode_string(&packed(&fs::read(bound.join(SESSION.file("_bg.wasm")))?)?);
     let unpacker = Base64::encode_string(&gzipped(&fs::read(bound.join(UNPACKER.file("_bg.wasm")))?)?);
@@ -179,6 +179,23 @@ fn assembled(bound: &Path) -> Result<String> {
         done = place + length;
     }
     Ok(out + &template[done..])
+}
+
+/// A script without indentation, empty lines, and lines that are comments alone.
+fn without_comments(script: &str) -> Result<String> {
+    let (mut out, mut is_comment) = (String::new(), false);
+    for line in script.lines().map(str::trim) {
+        if is_comment || line.starts_with("/*") {
+            is_comment = !line.contains("*/");
+            ensure!(is_comment || line.ends_with("*/"), "code behind a comment: {line}");
+        } else if !line.is_empty() && !line.starts_with("//") {
+            ensure!(line.matches('`').count().is_multiple_of(2), "a text over several lines: {line}");
+            out += line;
+            out.push('\n');
+        }
+    }
+    ensure!(!is_comment, "a comment that does not end");
+    Ok(out)
 }
 
 /// What reports need of the policy of a page that shows them.
@@ -259,4 +276,19 @@ fn gzipped(bytes: &[u8]) -> Result<Vec<u8>> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::new(8));
     encoder.write_all(bytes)?;
     Ok(encoder.finish()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_are_left_out_of_a_script() {
+        let script =
+            "/**\n * What it does.\n */\nfunction f() {\n    // Why.\n    return 2 * 3; // how\n}\n/* one line */\n";
+        assert_eq!(without_comments(script).ok().as_deref(), Some("function f() {\nreturn 2 * 3; // how\n}\n"));
+        for unclear in ["/* why */ f();\n", "let text = `over\nlines`;\n", "/* no end\n"] {
+            assert!(without_comments(unclear).is_err(), "{unclear}");
+        }
+    }
 }

@@ -238,9 +238,10 @@ impl Out {
         Ok(out)
     }
 
-    /// Writes one line; `false` if the reader has closed the pipe.
+    /// Writes one line by one call: `BufWriter` does not split what fits its buffer, so that a run that is killed leaves whole lines.
+    /// `false` if the reader has closed the pipe.
     fn line(&mut self, line: &str) -> Result<bool, Failure> {
-        let written = writeln!(self.to, "{line}");
+        let written = self.to.write_all(format!("{line}\n").as_bytes());
         self.done(written)
     }
 
