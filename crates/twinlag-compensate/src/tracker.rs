@@ -16,6 +16,9 @@ const JUMP_CHANCE_PER_SAMPLE: f64 = 1e-9;
 /// Degrees of freedom of Student's distribution in which readings weigh the factors, so that a
 /// single wrong one does not decide.
 const STUDENT_FREEDOM: f64 = 8.0;
+/// Samples for which a sensor may give no reading before those of the other one weigh no factor: alone they say of it only what is
+/// assumed of the gas, a sensor that is slow and a gas that is calm looking alike. Sensors that are read in turn stay below. Chosen.
+const MOST_ALONE_SAMPLES: u64 = 10;
 
 /// The gas temperature and the time constants at an instant, from the readings up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +55,8 @@ pub struct Tracker<const D: usize> {
     log_likelihood: Vec<f64>,
     /// Chance of a step to either neighbour.
     leaves: f64,
+    /// Samples since either sensor was read.
+    unread: [u64; 2],
 }
 
 impl<const D: usize> Tracker<D> {
@@ -71,7 +76,7 @@ impl<const D: usize> Tracker<D> {
         chance[FACTORS / 2] = 1.0;
         let leaves = (0.5 * change * change * period_s / (spacing * spacing)).min(1.0 / 3.0);
         let (next, log_likelihood) = (chance.clone(), vec![0.0; FACTORS]);
-        Some(Self { streams, log_factor, chance, next, log_likelihood, leaves })
+        Some(Self { streams, log_factor, chance, next, log_likelihood, leaves, unread: [0; 2] })
     }
 
     /// Goes through so many samples without readings, as that many calls of [`Self::push`] without any would; the work grows as the
@@ -82,6 +87,7 @@ impl<const D: usize> Tracker<D> {
     /// of `j = 0`, which is the same everywhere.
     pub fn skip(&mut self, samples: u64) {
         self.streams.iter_mut().for_each(|stream| stream.skip(samples));
+        self.unread = self.unread.map(|unread| unread.saturating_add(samples));
         let count = FACTORS as f64;
         let wave = |j: usize, k: usize| (PI * j as f64 * (k as f64 + 0.5) / count).cos();
         let left = |j: usize| {
@@ -112,12 +118,16 @@ impl<const D: usize> Tracker<D> {
             ([0.0; FACTORS], [0.0; FACTORS], [0.0; FACTORS]);
         let mut most = f64::NEG_INFINITY;
         let count = reading_c.iter().flatten().count() as f64;
+        for (unread, reading_c) in self.unread.iter_mut().zip(&reading_c) {
+            *unread = if reading_c.is_some() { 0 } else { unread.saturating_add(1) };
+        }
+        let is_alone = self.unread.iter().any(|unread| *unread > MOST_ALONE_SAMPLES);
         for (k, stream) in self.streams.iter_mut().enumerate() {
             let now = stream.push(reading_c);
             (gas_c[k], square[k], normalised_innovation_squared[k]) =
                 (now.gas_c, now.variance_k2, now.normalised_innovation_squared);
             let tails = (STUDENT_FREEDOM + count) * (now.normalised_innovation_squared / STUDENT_FREEDOM).ln_1p();
-            self.log_likelihood[k] = -0.5 * (tails + now.innovation_variance.ln());
+            self.log_likelihood[k] = if is_alone { 0.0 } else { -0.5 * (tails + now.innovation_variance.ln()) };
             most = most.max(self.log_likelihood[k]);
         }
         let mut sum = 0.0;

@@ -82,6 +82,7 @@ pub fn unseen(
     half_s: [Option<f64>; 3],
     watch: Watch<'_>,
 ) -> Result<[Vec<Identifier>; 3], ModelError> {
+    let observations = &observations.between_missing();
     let asked = Asked { settings, tau_s, beside, watch };
     let most = settings.policy.hidden_effect_probability;
     let above = |hidden: &[Hidden], share: f64| decisive(hidden, &half_s, share * most).concat();

@@ -9,6 +9,9 @@ use crate::instants::Instants;
 
 /// Fewest samples of a stretch that is used.
 const MIN_STRETCH_SAMPLES: usize = 8;
+/// Fewest samples of a part between missing readings, and fewest of a record that its parts may have. Chosen.
+const MIN_PART_SAMPLES: usize = 32;
+const MIN_KEPT_SHARE: f64 = 0.8;
 /// Fewest and most samples that a delay may reach. Chosen.
 const MIN_REACH_SAMPLES: usize = 2;
 const MAX_REACH_SAMPLES: usize = 64;
@@ -63,6 +66,18 @@ impl Stretch {
     #[must_use]
     pub fn with_missing(self, masked: [Vec<bool>; 2]) -> Self {
         Self { masked, ..self }
+    }
+
+    /// A stretch of some of its samples, without the flow.
+    fn part(&self, samples: Range<usize>) -> Self {
+        Self {
+            time_s: self.time_s.cut(samples.clone()),
+            reading_c: [0, 1].map(|i| Arc::new(self.reading_c[i][samples.clone()].to_vec())),
+            masked: [0, 1].map(|i| self.masked[i][samples.clone()].to_vec()),
+            flow: None,
+            member: self.member,
+            noise_factor: self.noise_factor,
+        }
     }
 
     /// This stretch with a measured flow velocity or density at each sample, positive, in any unit.
@@ -277,20 +292,37 @@ impl Observations {
                     continue;
                 }
                 if from + length <= n {
-                    let cut = from..from + length;
-                    stretches.push(Arc::new(Stretch {
-                        time_s: stretch.time_s.cut(cut.clone()),
-                        reading_c: [0, 1].map(|i| Arc::new(stretch.reading_c[i][cut.clone()].to_vec())),
-                        masked: [0, 1].map(|i| stretch.masked[i][cut.clone()].to_vec()),
-                        flow: None,
-                        member: stretch.member,
-                        noise_factor: stretch.noise_factor,
-                    }));
+                    stretches.push(Arc::new(stretch.part(from..from + length)));
                 }
                 break;
             }
         }
         if stretches.is_empty() {
+            return self.clone();
+        }
+        Self { reach: reach(&stretches), ..self.with_stretches(stretches) }
+    }
+
+    /// The parts of all stretches between missing readings, those that are long enough; the record as it is where nothing is missing, where
+    /// a flow was measured, or where fewer samples than most would be left.
+    ///
+    /// Derivatives at an effect of no size need it: of a delay or a lag of none, the weight of a missing reading in a residual is none, and
+    /// its variance without bound.
+    #[must_use]
+    pub fn between_missing(&self) -> Self {
+        let is_missing = |stretch: &Stretch, k: usize| stretch.masked[0][k] || stretch.masked[1][k];
+        let mut stretches = Vec::new();
+        for stretch in &self.stretches {
+            let mut first = 0;
+            for end in (0..=stretch.len()).filter(|k| *k == stretch.len() || is_missing(stretch, *k)) {
+                if end - first >= MIN_PART_SAMPLES {
+                    stretches.push(Arc::new(stretch.part(first..end)));
+                }
+                first = end + 1;
+            }
+        }
+        let kept: usize = stretches.iter().map(|stretch| stretch.len()).sum();
+        if self.flow.is_some() || kept == self.samples() || (kept as f64) < MIN_KEPT_SHARE * self.samples() as f64 {
             return self.clone();
         }
         Self { reach: reach(&stretches), ..self.with_stretches(stretches) }

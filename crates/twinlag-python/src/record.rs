@@ -10,7 +10,7 @@ use twinlag::record::{NamedColumn, Record as Inner, SamplingKind, Selection, Tab
 use twinlag_files::Choice;
 
 use crate::column::Column;
-use crate::error::{of_file, of_record};
+use crate::error::{RecordError, of_file, of_record};
 use crate::verbs::parsed;
 
 /// Two temperatures over time, checked.
@@ -58,15 +58,19 @@ impl Record {
         Ok(Self { inner: Arc::new(made.map_err(|error| of_record(&error))?) })
     }
 
-    /// A record of a file.
+    /// A record of a file. One of text has no groups: that one is asked for is refused.
     #[staticmethod]
     #[pyo3(signature = (path, selection, group = None, join = false))]
     fn read(py: Python<'_>, path: PathBuf, selection: &str, group: Option<String>, join: bool) -> PyResult<Self> {
         let selection: Selection = parsed(selection)?;
+        let is_of_groups = group.is_some() || join;
         let choice = Choice { group, join, ..Choice::of(&selection) };
         let table = py.detach(|| {
             if twinlag_files::is_binary(&path) {
                 twinlag_files::read(&path, &choice).map_err(|error| of_file(&error))
+            } else if is_of_groups {
+                let what = "expected no group and no join: it is text, which has one group alone";
+                Err(RecordError::new_err((format!("{}: {what}", path.display()),)))
             } else {
                 Table::from_path(&path).map_err(|error| of_record(&error))
             }

@@ -217,6 +217,9 @@ def test_a_model_of_another_schema_is_refused(diagnosis, tmp_path) -> None:
         {"intervals": "bootstrap", "seed": True},
         {"estimator": 5},
         {"hold": ["auto"]},
+        {"best_effort": "no"},
+        {"noise_ratio": "1"},
+        {"progress": "yes"},
     ],
 )
 def test_options_that_are_not_what_they_have_to_be_are_named(rig, options) -> None:
@@ -240,6 +243,8 @@ def test_series_go_to_the_rows_of_a_frame(rig) -> None:
     for frame in (logged, twice):
         beside = pd.concat([frame, gas.to_frame(frame.index)], axis=1)
         assert np.array_equal(beside["gas_C"], want) and beside.index.equals(frame.index)
+        assert set(beside["grade"]) == {gas.grade}
+    assert pickle.loads(pickle.dumps(gas)).to_frame(logged.index).equals(gas.to_frame(logged.index))
     with pytest.raises(ValueError, match="rows"):
         gas.to_frame(index)
 
@@ -255,3 +260,22 @@ def test_a_track_of_windows_has_no_rows_of_the_record(rig) -> None:
 def test_a_folder_that_is_not_there_is_named(diagnosis, tmp_path) -> None:
     with pytest.raises(FileNotFoundError, match="no such folder.*nowhere'$"):
         diagnosis.report(tmp_path / "nowhere" / "page.html")
+
+
+def test_what_is_not_used_is_said(rig, diagnosis, tmp_path) -> None:
+    assert "not used here: estimator" in str(tl.diagnose(rig, estimator="hybrid"))
+    with pytest.raises(ValueError, match="^without: "):
+        tl.compensate(rig, model=diagnosis.model, without=["delay"])
+    text = tmp_path / "record.csv"
+    rig.to_frame().to_csv(text)
+    with pytest.raises(tl.RecordError, match="group"):
+        tl.read(text, group="gas")
+    for form in (-3, True, "backward"):
+        with pytest.raises((TypeError, ValueError), match="^form: "):
+            tl.compensate(rig, form=form)
+    picture = tmp_path / "picture.png"
+    picture.write_bytes(b"\x89PNG\r\n")
+    with pytest.raises(ValueError, match="picture.png: expected a model"):
+        tl.load_model(picture)
+    with pytest.raises(TypeError, match="expected a twinlag.Record"):
+        tl.diagnose(None)

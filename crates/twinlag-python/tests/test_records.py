@@ -51,7 +51,7 @@ def test_missing_values_are_missing_however_they_are_written(arrays) -> None:
     [
         (np.zeros((2, 3)), "shape"),
         (np.zeros(0), "no data|empty|rows|samples|length"),
-        (np.array(["a", "b"]), "expected numbers"),
+        (np.array(["20.5", "b"]), "expected numbers, got text, such as 'b' in row 2"),
         (np.array([object(), object()], dtype=object), "expected a number"),
         (np.array([1j, 2j]), "expected numbers"),
         (np.array([True, False]), "expected numbers"),

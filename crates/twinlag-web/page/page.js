@@ -304,16 +304,17 @@
     return JSON.stringify({ ...(known.length > 0 && { known }), ...(noise_std_k.length > 0 && { noise_std_k }) });
   }
 
-  // Levels of both sensors. A comma before a blank parts them; another one is a decimal comma.
+  // Levels of both sensors. A comma parts them before a blank or beside a decimal point; another one is a decimal comma.
   function noise() {
-    const levels = byId("noise").value.trim().replace(/,\s+/g, " ").split(/[;\s]+/).filter(Boolean);
+    const said = byId("noise").value.trim();
+    const levels = said.replace(said.includes(".") ? /,/g : /,\s+/g, " ").split(/[;\s]+/).filter(Boolean);
     return levels.map((level) => Number(level.replace(",", ".")));
   }
 
   function checkNoise() {
     const levels = noise();
     const isEmptyOrPair = levels.length === 0 || (levels.length === 2 && levels.every((level) => Number.isFinite(level) && level > 0));
-    return isValid("noise", isEmptyOrPair, "expected the noise of the first and of the second sensor in K, without its unit, such as 0.1 0.15");
+    return isValid("noise", isEmptyOrPair, "expected the noise of the first and of the second sensor in K, both above 0 and without their unit, such as 0.1, 0.15");
   }
 
   // NaN where it is no time.

@@ -26,19 +26,26 @@ class Answer:
     Not made by its constructor, but by the verbs.
     """
 
-    __slots__ = ("_fields", "_inner", "_pickled_model", "_series")
+    __slots__ = ("_fields", "_inner", "_pickled_model", "_pickled_samples", "_series")
     _inner: _core.Answer | None
     _fields: dict[str, Any]
     _series: dict[str, Any]
     _pickled_model: str | None
+    _pickled_samples: Any
 
     def __init__(
-        self, inner: _core.Answer | None, fields: dict[str, Any], series: dict[str, Any], pickled_model: str | None = None
+        self,
+        inner: _core.Answer | None,
+        fields: dict[str, Any],
+        series: dict[str, Any],
+        pickled_model: str | None = None,
+        pickled_samples: Any = None,
     ) -> None:
         self._inner = inner
         self._fields = fields
         self._series = series
         self._pickled_model = pickled_model
+        self._pickled_samples = pickled_samples
         for values in series.values():
             if hasattr(values, "setflags"):
                 values.setflags(write=False)
@@ -141,7 +148,7 @@ class Answer:
     def __str__(self) -> str:
         lines = [self._headline()]
         lines.extend(self._lines())
-        lines.extend(f"warning: {warning}" for warning in self._model_fields["warnings"])
+        lines.extend(f"warning: {warning}" for warning in (*self._fields.get("remarks", ()), *self._model_fields["warnings"]))
         return "\n".join(lines)
 
     def _lines(self) -> list[str]:
@@ -276,20 +283,37 @@ class _WithSeries(Answer):
         Raises
         ------
         ValueError
-            An index of another length than the record, or a track of windows, which have instants of their own.
+                An index of another length than the record, or a track of windows, which have instants of their own.
         """
-        import numpy as np
-        import pandas as pd
-
-        frame = pd.DataFrame(self._series)
+        frame = self._frame()
         if index is None:
             return frame.set_index("time_s")
-        samples = self._asked().samples_of_rows()
+        samples = self._samples_of_rows()
         if len(index) != len(samples):
             raise ValueError(f"index: expected one of the record's {len(samples)} rows, got {len(index)}")
-        placed = frame.drop(columns="time_s").reindex(np.array([-1 if sample is None else sample for sample in samples]))
+        placed = frame.drop(columns="time_s").reindex(samples)
         placed.index = index
         return placed
+
+    def _frame(self) -> Any:
+        import pandas as pd
+
+        return pd.DataFrame(self._series)
+
+    def _samples_of_rows(self) -> Any:
+        """For each row of the record the index of its sample in the series, −1 where it has none."""
+        import numpy as np
+
+        if self._inner is None and self._pickled_samples is not None:
+            return self._pickled_samples
+        return np.array([-1 if sample is None else sample for sample in self._asked().samples_of_rows()], dtype=np.int64)
+
+    def __reduce__(self) -> Any:
+        try:
+            samples = self._samples_of_rows()
+        except ValueError:  # windows have no rows
+            samples = None
+        return type(self), (None, self._fields, self._series, self._model_text(), samples)
 
     def _verdict(self) -> str:
         return f"{self.status}, {self.grade}"
@@ -309,6 +333,9 @@ class Compensation(_WithSeries):
     def gas_std_k(self) -> NDArray[float64]:
         """Its standard deviation, K."""
         return self._series["gas_std_K"]  # type: ignore[no-any-return]
+
+    def _frame(self) -> Any:
+        return super()._frame().assign(grade=self.grade)
 
     @property
     def model(self) -> Model | None:

@@ -26,7 +26,7 @@ def finite(value: Any, name: str) -> float:
     >>> finite(2, "window_s")
     2.0
     """
-    number = _number(value)
+    number = None if isinstance(value, str) else _number(value)
     if number is None:
         raise TypeError(f"{name}: expected a number, got {value!r}")
     if not math.isfinite(number):
@@ -49,6 +49,17 @@ def count(value: Any, name: str) -> int:
     if whole < 0:
         raise ValueError(f"{name}: expected a whole number from 0, got {value!r}")
     return whole
+
+
+def flag(value: Any, name: str) -> bool:
+    """True or false, whether of Python or of NumPy.
+
+    >>> flag(True, "best_effort")
+    True
+    """
+    if not _is_bool(value):
+        raise TypeError(f"{name}: expected True or False, got {value!r}")
+    return bool(value)
 
 
 def _number(value: Any) -> float | None:
@@ -87,7 +98,11 @@ def numbers(values: Any, name: str) -> NDArray[float64]:
     import numpy as np
 
     array = _one_dimensional(values, name)
-    if array.dtype.kind in "cmMbSUV":
+    if array.dtype.kind in "SU":
+        bad = next((row for row, cell in enumerate(array) if _number(cell) is None), None)
+        such = "" if bad is None else f", such as {str(array[bad])!r} in row {bad + 1}"
+        raise RecordError(f"{name}: expected numbers, got text{such}")
+    if array.dtype.kind in "cmMbV":
         raise RecordError(f"{name}: expected numbers, got values of type {array.dtype}")
     if array.dtype == object:
         return _of_objects(array, name)

@@ -37,7 +37,7 @@ class LiveAnswer(NamedTuple):
     gas_std_k: float
     """Its standard deviation, K."""
     tau_s: tuple[float | None, float | None]
-    """Both time constants, s; ``None`` while the readings of late do not determine them."""
+    """Both time constants, s; ``None`` while the readings of late do not determine them, or while they may be beyond what is tracked."""
     tau_95_s: tuple[Band | None, Band | None]
     """Ends of their 95 % bands, s."""
     is_beyond: bool

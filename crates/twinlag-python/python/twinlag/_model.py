@@ -52,11 +52,11 @@ def load_model(path: str | os.PathLike[str]) -> Model:
     ValueError
         It is no such file.
     """
-    with open(path, encoding="utf-8") as file:
-        text = file.read()
     try:
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
         _core.check_model(text)
-    except ValueError as error:
+    except ValueError as error:  # bytes that are no text among them
         expected = "expected a model written by `twinlag diagnose --save` or Model.save"
         raise ValueError(f"{os.fspath(path)}: {expected}: {error}") from None
     return Model(json.loads(text))

@@ -14,6 +14,8 @@ def shown(progress: Any) -> Iterator[Callable[[str, int, int], object] | None]:
         yield None
     elif callable(progress):
         yield progress
+    elif progress is not True:
+        raise TypeError(f"progress: expected True, or what is called with task, steps done and steps in all, got {progress!r}")
     else:
         try:
             from tqdm.auto import tqdm

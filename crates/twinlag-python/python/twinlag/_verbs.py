@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from twinlag import _core
 from twinlag._answers import Characterisation, Compensation, Diagnosis, Track
-from twinlag._columns import count, finite
+from twinlag._columns import count, finite, flag
 from twinlag._model import Model
 from twinlag._progress import shown
 from twinlag._record import Record
@@ -78,7 +78,7 @@ def _options(channels: tuple[str, str], **given: Unpack[Options]) -> dict[str, A
         "second_order": [place in {sensors[name] for name in second_order} for place in (0, 1)],
         "known": [_known(name, value, channels) for name, value in _mapping(given.get("known")).items()],
         "quiet_segments_s": [_stretch(stretch) for stretch in given.get("quiet_s") or ()],
-        "best_effort": bool(given.get("best_effort", False)),
+        "best_effort": flag(given.get("best_effort", False), "best_effort"),
     }
     noise_std_k = given.get("noise_std_k")
     if noise_std_k is not None:
@@ -155,7 +155,7 @@ def _known(name: str, value: Value, channels: tuple[str, str]) -> str:
 
 
 def _records(record: Record | Iterable[Record]) -> list[Record]:
-    records = [record] if isinstance(record, Record) else list(record)
+    records = [record] if isinstance(record, Record) else list(record) if isinstance(record, Iterable) else []
     if not records or not all(isinstance(record, Record) for record in records):
         raise TypeError("expected a twinlag.Record, or several of one rig; make one by twinlag.read or twinlag.Record")
     if len({id(record) for record in records}) < len(records):
@@ -317,7 +317,9 @@ def compensate(
     sensors = _places(record.channels)
     trusted = record.channels[0] if trust is None else trust
     _expect((trusted,), tuple(sensors), "trust")
-    its_form: Any = {"fixed-lag": int(form)} if isinstance(form, int) else form
+    its_form: Any = form if form in ("smoother", "filter") else {"fixed-lag": count(form, "form")}
+    if model is not None and _names(without):
+        raise ValueError("without: of a diagnosis; with a model there is none, and the effects are those of the model")
     others = {"model": _fields(model), "form": its_form, "trusted": sensors[trusted], "without": list(_names(without))}
     asked = _asked(_options(record.channels, **options), **others)
     with shown(progress) as report:

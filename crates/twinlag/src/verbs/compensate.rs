@@ -196,7 +196,13 @@ impl Modelled {
     fn of(record: &Record, options: &CompensateOptions, watch: Watch<'_>) -> Result<Self, Error> {
         if let Some(model) = &options.model {
             let (last, fit) = with_model(record, Some(model), &options.diagnose.characterise)?;
-            let warnings = last.warnings.clone();
+            let mut warnings = last.warnings.clone();
+            if !options.diagnose.without.is_empty() {
+                warnings.push(
+                    "effects that a diagnosis is to leave out have no part here: the effects are those of the model"
+                        .into(),
+                );
+            }
             return Ok(Self {
                 last,
                 fit: without_trace(fit),

@@ -51,7 +51,8 @@ pub struct LiveAnswer {
     pub gas_c: f64,
     /// Its standard deviation, K.
     pub gas_std_k: f64,
-    /// Both time constants, s; `None` while the readings of late do not determine them.
+    /// Both time constants, s; `None` while the readings of late do not determine them, and while they may have left the range that is
+    /// tracked.
     pub tau_s: [Option<f64>; 2],
     /// Ends of their 95 % bands, s; `None` where the time constant is.
     pub tau_95_s: [Option<[f64; 2]>; 2],
@@ -203,11 +204,12 @@ impl Live {
         // Of two readings a sample half a chi-square of two degrees, whose variance is 1.
         let excess = self.energy - 1.0 > CLEARLY / (2.0 * WATCHED).sqrt();
         let widened_by = if excess { self.energy.sqrt() } else { 1.0 };
+        let is_beyond = now.chance_beyond > LIKELY;
         let factor = now.log_factor.exp();
         let tau_s = self.tau_s.map(|tau_s| tau_s * factor);
         let tau_95_s = [0, 1].map(|i| {
             let half = widened_by * Z_975 * (now.log_variance + self.log_variance[i]).sqrt();
-            Some([-half, half].map(|by| tau_s[i] * by.exp())).filter(|band| !spans_too_much(*band))
+            Some([-half, half].map(|by| tau_s[i] * by.exp())).filter(|band| !is_beyond && !spans_too_much(*band))
         });
         Some(LiveAnswer {
             time_s,
@@ -215,7 +217,7 @@ impl Live {
             gas_std_k: widened_by * now.variance_k2.sqrt(),
             tau_s: [0, 1].map(|i| tau_95_s[i].map(|_| tau_s[i])),
             tau_95_s,
-            is_beyond: now.chance_beyond > LIKELY,
+            is_beyond,
             widened_by,
             is_resumed,
         })
