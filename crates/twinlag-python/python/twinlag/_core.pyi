@@ -39,8 +39,8 @@ class Answer:
         """
     def samples_of_rows(self, /) -> list[int | None]:
         """
-        The sample of the series that each row of the record is, from 0; `None` of a row without one, and of all rows where the series
-        has other instants than the record.
+        For each row of the record the index of its sample in the series, from 0; `None` where it has none. Fails for a series that has other
+        instants than the record.
         """
     def series(self, /) -> list[tuple[str, NDArray[float64] | list[str]]]:
         """
@@ -104,7 +104,7 @@ class Record:
     @staticmethod
     def read(path: str | PathLike[str], selection: str, group: str | None = None, join: bool = False) -> Record:
         """
-        A record of a file.
+        A record of a file. One of text has no groups: that one is asked for is refused.
         """
     @property
     def reference_c(self, /) -> NDArray[float64] | None:

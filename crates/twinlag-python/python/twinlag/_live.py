@@ -28,7 +28,12 @@ def _reading(value: float | None, name: str) -> float | None:
 
 
 class LiveAnswer(NamedTuple):
-    """What is known at an instant, from the readings up to it."""
+    """What is known at an instant, from the readings up to it.
+
+    ``time_s``; ``gas_c`` with its standard deviation ``gas_std_k``; both time constants, ``tau_s``, with the ends of their 95 % bands,
+    ``tau_95_s``, or ``None``; ``is_beyond``, whether they may have left the range that is tracked; ``widened_by``, what bands were
+    multiplied by because readings are farther off than noise takes them; ``is_resumed``, whether there was a long pause before this row, or the clock was set.
+    """
 
     time_s: float
     """The instant, s."""
