@@ -306,8 +306,8 @@ impl Observations {
     /// The parts of all stretches between missing readings, those that are long enough; the record as it is where nothing is missing, where
     /// a flow was measured, or where fewer samples than most would be left.
     ///
-    /// Derivatives at an effect of no size need it: of a delay or a lag of none, the weight of a missing reading in a residual is none, and
-    /// its variance without bound.
+    /// Derivatives at an effect of no size need it: at a delay or a lag of 0 a missing reading has the weight 0 in the residuals next to it, and
+    /// a variance without bound.
     #[must_use]
     pub fn between_missing(&self) -> Self {
         let is_missing = |stretch: &Stretch, k: usize| stretch.masked[0][k] || stretch.masked[1][k];

@@ -157,8 +157,8 @@ fn options_that_cannot_be_are_refused_by_every_verb() {
     }
 }
 
-/// Failed: of a delay of none the weight of a missing reading is none, and its variance without bound, so that a single missing reading
-/// made a delay or a second lag that nobody had seen improbable: a time constant that is 7 half intervals off was `go`.
+/// Failed: at a delay of 0 a missing reading has the weight 0 and a variance without bound, so that a single one made a delay or a second
+/// lag that nobody had seen improbable: a time constant that is 7 half intervals off was `go`.
 #[test]
 fn a_missing_reading_leaves_conditions_as_they_are() {
     for seed in 0..4 {
