@@ -96,11 +96,13 @@ def test_instants_of_any_kind(arrays) -> None:
     aware = [datetime.datetime(2026, 1, 31, 12, tzinfo=utc) + datetime.timedelta(milliseconds=2 * k) for k in range(len(t1))]
     texts = [str(stamp) for stamp in stamps]
     objects = np.array(texts, dtype=object)
-    objects[-1] = float("nan")  # as pandas has a missing text
     for time in (stamps, stamps.astype("datetime64[ms]"), stamps - start, aware, texts, objects):
         record = tl.Record(time, t1, t2)
         assert record.sample_period_s == pytest.approx(0.002, rel=1e-9)
         assert record.time_s[0] == 0.0
+    objects[9] = float("nan")  # as pandas has a missing text
+    with pytest.raises(tl.RecordError, match="sample 10, .*the time is missing"):
+        tl.Record(objects, t1, t2)
 
 
 def test_frames(arrays) -> None:
