@@ -9,7 +9,7 @@ use crate::instants::Instants;
 
 /// Fewest samples of a stretch that is used.
 const MIN_STRETCH_SAMPLES: usize = 8;
-/// Fewest samples of a part between missing readings, and fewest of a record that its parts may have. Chosen.
+/// Fewest samples of a part between missing readings, and the least share of a record's samples that its parts have to keep. Chosen.
 const MIN_PART_SAMPLES: usize = 32;
 const MIN_KEPT_SHARE: f64 = 0.8;
 /// Fewest and most samples that a delay may reach. Chosen.

@@ -17,29 +17,49 @@ pub(super) fn run(site: &Site) -> Result<()> {
         return Ok(());
     };
     let record = "record.csv";
-    let runs: [&[&str]; 5] = [
+    let runs: [&[&str]; 4] = [
         &["compensate", record, "--out", "disk/gas.csv"],
         &["compensate", record, "--out", "gas-2.csv", "--picture", "disk/gas.svg"],
         &["diagnose", record, "--report", "disk/report.html"],
-        &["study", "run", "plan.toml", "--out", "disk/study"],
         &["track", record, "--out", "disk/track.csv"],
     ];
     for run in runs {
-        let output = site.said(run)?;
+        site.lacks_room(run)?;
+        let left = files(&disk.0)?;
+        ensure!(left.is_empty(), "twinlag {}: left {left:?}", run.join(" "));
+    }
+    println!(
+        "full disk: {} runs end with a message that names the file and what is lacking, and leave no file",
+        runs.len()
+    );
+    site.study_goes_on_elsewhere(&disk)
+}
+
+impl Site {
+    /// A run that has to end because a disk is full, and to say so.
+    fn lacks_room(&self, run: &[&str]) -> Result<()> {
+        let output = self.said(run)?;
         let said = String::from_utf8_lossy(&output.stderr);
         let asked = run.join(" ");
         ensure!(output.status.code() == Some(1), "twinlag {asked}: ended with {}: {said}", output.status);
         ensure!(said.contains("disk/") && said.contains("No space left"), "twinlag {asked}: said {said}");
-        // A study goes on from its plan and its parts.
-        let is_kept = |path: &PathBuf| ["plan.toml", "part-0-of-1.json"].iter().any(|name| path.ends_with(name));
-        let left: Vec<PathBuf> = files(&disk.0)?.into_iter().filter(|path| !is_kept(path)).collect();
-        ensure!(left.is_empty(), "twinlag {asked}: left {left:?}");
+        Ok(())
     }
-    println!(
-        "full disk: {} runs end with a message that names the file and what is lacking, and leave no output",
-        runs.len()
-    );
-    Ok(())
+
+    /// A study keeps its plan and what it has computed: moved to where there is room, it goes on to the bytes of one run.
+    fn study_goes_on_elsewhere(&self, disk: &Disk) -> Result<()> {
+        self.lacks_room(&["study", "run", "plan.toml", "--out", "disk/study"])?;
+        let moved = self.folder.join("moved-study");
+        fs::create_dir_all(&moved)?;
+        for path in files(&disk.0)? {
+            fs::copy(&path, moved.join(path.file_name().unwrap_or_default()))?;
+        }
+        self.whole(&["study", "run", "plan.toml", "--out", "moved-study", "--resume"])?;
+        let results = ["0-study", "moved-study"].map(|study| self.read(&format!("{study}/results.json")));
+        ensure!(results[0].is_some() && results[0] == results[1], "study: other bytes after a full disk");
+        println!("full disk: a study goes on elsewhere from what it has kept, to the bytes of one run");
+        Ok(())
+    }
 }
 
 /// All files below a folder.

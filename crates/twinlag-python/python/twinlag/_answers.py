@@ -283,7 +283,7 @@ class _WithSeries(Answer):
         Raises
         ------
         ValueError
-                An index of another length than the record, or a track of windows, which have instants of their own.
+            An index of another length than the record, or a track of windows, which have instants of their own.
         """
         frame = self._frame()
         if index is None:
