@@ -66,7 +66,7 @@ pub fn pieces_of_long(samples: usize) -> Option<Vec<Range<usize>>> {
 /// Looks at ever longer pieces are taken until all that would move a number is improbable enough, and at those effects alone of
 /// which a shorter one has left it open: whatever part of a record makes an effect improbable, it is. The likeliest come first,
 /// and where these are improbable enough after all, the others are not looked at again. A record of more than 65 536 samples is
-/// judged by four pieces of it, and one with missing readings by its parts between them ([`Observations::between_missing`]).
+/// judged by four pieces of it.
 ///
 /// - `tau_s`: where to begin the fit of the two lags, s
 /// - `beside`: effects that are in the model beside these, each with its channel
@@ -82,7 +82,6 @@ pub fn unseen(
     half_s: [Option<f64>; 3],
     watch: Watch<'_>,
 ) -> Result<[Vec<Identifier>; 3], ModelError> {
-    let observations = &observations.between_missing();
     let asked = Asked { settings, tau_s, beside, watch };
     let most = settings.policy.hidden_effect_probability;
     let above = |hidden: &[Hidden], share: f64| decisive(hidden, &half_s, share * most).concat();

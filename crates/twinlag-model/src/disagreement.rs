@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use crate::directions::Direction;
 use crate::inverse::Inverse;
+use crate::masked::masked_std_k;
 use crate::number::{Number, Real};
 use crate::observations::{Observations, Stretch};
 use crate::plant::{Place, Plant};
@@ -16,9 +17,6 @@ use crate::rows::Rows;
 use crate::selection::Span;
 use crate::whitening::{Adjoint, DERIVATIVE_ROUNDING, Factor, FactorDerivative, Source, Variance};
 
-/// Noise of a masked reading, in times the swing: far beyond what the reading could say, and not so far that rounding
-/// is lost to it (the square of a ratio of 1e7 to the noise is what double precision holds).
-const MASKED_NOISE_SWINGS: f64 = 20.0;
 /// Fewest disagreements of a stretch: one of fewer is left out.
 const MIN_DISAGREEMENTS: usize = 4;
 /// Samples of a window: what a derivative of one works on, some twenty numbers for each sample, is a megabyte. Chosen.
@@ -44,13 +42,14 @@ pub(crate) struct Piece {
     pub(crate) first_sample: usize,
 }
 
-/// Variance of each reading of both channels of a stretch, K²: boundless, to all purposes, where it is masked.
+/// Variance of each reading of both channels of a stretch, K²: of masked ones how far they may be off.
 ///
 /// - `noise_std_k`: white noise of the channels in all stretches, K
+/// - `swing_k`: standard deviation of the more lively channel, K
 pub(crate) fn reading_variances(noise_std_k: [f64; 2], stretch: &Stretch, swing_k: f64) -> [Variance; 2] {
     [0, 1].map(|i| {
         let std_k = noise_std_k[i] * stretch.noise_factor[i];
-        Variance::masked(std_k * std_k, (MASKED_NOISE_SWINGS * swing_k).powi(2), &stretch.masked[i])
+        Variance::masked(std_k, &masked_std_k(stretch, i, std_k, swing_k))
     })
 }
 

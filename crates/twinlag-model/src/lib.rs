@@ -27,6 +27,7 @@ mod instants;
 mod inverse;
 mod known;
 mod lag_pair;
+mod masked;
 mod member_noise;
 mod mismatch_bias;
 mod model;

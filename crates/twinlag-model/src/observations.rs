@@ -9,9 +9,6 @@ use crate::instants::Instants;
 
 /// Fewest samples of a stretch that is used.
 const MIN_STRETCH_SAMPLES: usize = 8;
-/// Fewest samples of a part between missing readings, and the least share of a record's samples that its parts have to keep. Chosen.
-const MIN_PART_SAMPLES: usize = 32;
-const MIN_KEPT_SHARE: f64 = 0.8;
 /// Fewest and most samples that a delay may reach. Chosen.
 const MIN_REACH_SAMPLES: usize = 2;
 const MAX_REACH_SAMPLES: usize = 64;
@@ -39,7 +36,7 @@ pub struct Stretch {
     pub time_s: Instants,
     /// Readings of channels 1 and 2, °C, which whoever has them already shares.
     pub reading_c: [Arc<Vec<f64>>; 2],
-    /// Readings that say nothing (spikes, saturation): their noise counts as boundless.
+    /// Readings that say next to nothing (missing, spikes, saturation): they have the noise of how far they may be off.
     pub masked: [Vec<bool>; 2],
     /// Flow velocity or density, in any unit, or the speed of sensors that move, m/s.
     flow: Option<(FlowKind, Vec<f64>)>,
@@ -62,7 +59,7 @@ impl Stretch {
     }
 
     /// This stretch, with the marked readings of either channel ignored. They are missing readings,
-    /// in whose place stands some value between their neighbours.
+    /// in whose place stands a value between their neighbours.
     #[must_use]
     pub fn with_missing(self, masked: [Vec<bool>; 2]) -> Self {
         Self { masked, ..self }
@@ -298,31 +295,6 @@ impl Observations {
             }
         }
         if stretches.is_empty() {
-            return self.clone();
-        }
-        Self { reach: reach(&stretches), ..self.with_stretches(stretches) }
-    }
-
-    /// The parts of all stretches between missing readings, those that are long enough; the record as it is where nothing is missing, where
-    /// a flow was measured, or where fewer samples than most would be left.
-    ///
-    /// Derivatives at an effect of no size need it: at a delay or a lag of 0 a missing reading has the weight 0 in the residuals next to it, and
-    /// a variance without bound.
-    #[must_use]
-    pub fn between_missing(&self) -> Self {
-        let is_missing = |stretch: &Stretch, k: usize| stretch.masked[0][k] || stretch.masked[1][k];
-        let mut stretches = Vec::new();
-        for stretch in &self.stretches {
-            let mut first = 0;
-            for end in (0..=stretch.len()).filter(|k| *k == stretch.len() || is_missing(stretch, *k)) {
-                if end - first >= MIN_PART_SAMPLES {
-                    stretches.push(Arc::new(stretch.part(first..end)));
-                }
-                first = end + 1;
-            }
-        }
-        let kept: usize = stretches.iter().map(|stretch| stretch.len()).sum();
-        if self.flow.is_some() || kept == self.samples() || (kept as f64) < MIN_KEPT_SHARE * self.samples() as f64 {
             return self.clone();
         }
         Self { reach: reach(&stretches), ..self.with_stretches(stretches) }

@@ -41,30 +41,29 @@ impl<T: Real> Source<'_, T> {
 #[derive(Clone, Debug)]
 pub(crate) struct Variance {
     plain: f64,
-    boundless: f64,
-    /// Readings that say nothing, in rising order.
-    masked: Vec<usize>,
+    /// Masked readings, in rising order, each with its own.
+    masked: Vec<(usize, f64)>,
 }
 
 impl Variance {
     /// One variance for all readings.
     pub(crate) fn same(plain: f64) -> Self {
-        Self { plain, boundless: plain, masked: Vec::new() }
+        Self { plain, masked: Vec::new() }
     }
 
-    /// Another for those that are masked.
-    pub(crate) fn masked(plain: f64, boundless: f64, is_masked: &[bool]) -> Self {
-        let masked = is_masked.iter().enumerate().filter(|(_, is)| **is).map(|(k, _)| k).collect();
-        Self { plain, boundless, masked }
+    /// - `std_k`: standard deviation of all readings but those that are masked, K
+    /// - `masked`: those, in rising order, with the standard deviation of each, K
+    pub(crate) fn masked(std_k: f64, masked: &[(usize, f64)]) -> Self {
+        Self { plain: std_k * std_k, masked: masked.iter().map(|(k, std_k)| (*k, std_k * std_k)).collect() }
     }
 
     pub(crate) fn at(&self, sample: usize) -> f64 {
-        if self.masked.binary_search(&sample).is_ok() { self.boundless } else { self.plain }
+        self.masked.binary_search_by_key(&sample, |(k, _)| *k).map_or(self.plain, |place| self.masked[place].1)
     }
 
     /// The first masked reading from `sample` on.
     fn next_masked(&self, sample: usize) -> Option<usize> {
-        self.masked.get(self.masked.partition_point(|m| *m < sample)).copied()
+        self.masked.get(self.masked.partition_point(|(k, _)| *k < sample)).map(|(k, _)| *k)
     }
 
     fn has_masked_in(&self, samples: Range<usize>) -> bool {
@@ -722,8 +721,8 @@ mod tests {
 
     /// Variances of both channels, of which the second has two masked readings or none.
     fn variances(is_masked: bool) -> [Variance; 2] {
-        let masked: Vec<bool> = (0..SAMPLES).map(|k| is_masked && [17, 70].contains(&k)).collect();
-        [Variance::same(0.01), Variance::masked(0.04, 1e3, &masked)]
+        let masked = if is_masked { &[(17, 30.0), (70, 30.0)][..] } else { &[] };
+        [Variance::same(0.01), Variance::masked(0.2, masked)]
     }
 
     /// A run of two parts and more is value for value what single values are. Both add up six terms of size one, with a rounding of

@@ -1,6 +1,7 @@
 //! All tests of `twinlag-model` in one program: linked once, and run side by side.
 
 mod mismatch;
+mod missing;
 mod saturation;
 mod scatter;
 mod twins;
