@@ -325,7 +325,8 @@ mod tests {
             masked[other][k] = true;
             reading_c[other][k] += 100.0 * case.noise_k[other];
         }
-        let stretch = Stretch::new(of(&record.time_s), reading_c).with_missing(masked);
+        let mut stretch = Stretch::new(of(&record.time_s), reading_c);
+        stretch.masked = masked;
         Observations::new(vec![stretch], (!case.is_uneven).then_some(PERIOD_S)).expect("a record")
     }
 

@@ -36,8 +36,10 @@ pub struct Stretch {
     pub time_s: Instants,
     /// Readings of channels 1 and 2, °C, which whoever has them already shares.
     pub reading_c: [Arc<Vec<f64>>; 2],
-    /// Readings that say next to nothing (missing, spikes, saturation): they have the noise of how far they may be off.
+    /// Readings that do not count: missing ones, and wrong ones (spikes, saturation).
     pub masked: [Vec<bool>; 2],
+    /// Samples of those that are missing, in rising order.
+    missing: [Arc<Vec<usize>>; 2],
     /// Flow velocity or density, in any unit, or the speed of sensors that move, m/s.
     flow: Option<(FlowKind, Vec<f64>)>,
     /// The record that it is of, from 0, where several are joined.
@@ -55,14 +57,20 @@ impl Stretch {
     /// A stretch of which every sample counts, with readings that others hold as well.
     pub fn sharing(time_s: Instants, reading_c: [Arc<Vec<f64>>; 2]) -> Self {
         let masked = [vec![false; time_s.len()], vec![false; time_s.len()]];
-        Self { time_s, reading_c, masked, flow: None, member: 0, noise_factor: [1.0; 2] }
+        Self { time_s, reading_c, masked, missing: Default::default(), flow: None, member: 0, noise_factor: [1.0; 2] }
     }
 
     /// This stretch, with the marked readings of either channel ignored. They are missing readings,
     /// in whose place stands a value between their neighbours.
     #[must_use]
     pub fn with_missing(self, masked: [Vec<bool>; 2]) -> Self {
-        Self { masked, ..self }
+        let missing = masked.each_ref().map(|masked| Arc::new((0..masked.len()).filter(|k| masked[*k]).collect()));
+        Self { masked, missing, ..self }
+    }
+
+    /// Whether a reading is missing: it is masked, and what stands in its place lies between its neighbours.
+    pub(crate) fn is_missing(&self, channel: usize, sample: usize) -> bool {
+        self.missing[channel].binary_search(&sample).is_ok()
     }
 
     /// A stretch of some of its samples, without the flow.
@@ -71,6 +79,10 @@ impl Stretch {
             time_s: self.time_s.cut(samples.clone()),
             reading_c: [0, 1].map(|i| Arc::new(self.reading_c[i][samples.clone()].to_vec())),
             masked: [0, 1].map(|i| self.masked[i][samples.clone()].to_vec()),
+            missing: self.missing.each_ref().map(|missing| {
+                let of_part = missing.iter().filter(|k| samples.contains(k));
+                Arc::new(of_part.map(|k| k - samples.start).collect())
+            }),
             flow: None,
             member: self.member,
             noise_factor: self.noise_factor,
