@@ -1,15 +1,25 @@
-//! The whitened cost and its gradient against fifty digits: `tests/data/oracle.py`, dense matrices by mpmath.
+//! The whitened cost with its gradient, and gas temperatures, against fifty digits: `tests/data/oracle.py`, dense matrices by mpmath.
 
 use std::f64::consts::PI;
 use std::path::Path;
 
 use serde::Deserialize;
+use twinlag::compensation as gas;
 use twinlag::cross_relation::{CostError, Form, Readings, Segment, Steps, Whitened};
 use twinlag::sensor::Discretisation;
 
 #[derive(Deserialize)]
 struct Oracle {
     cases: Vec<Case>,
+    gas: Vec<GasCase>,
+}
+
+impl Oracle {
+    fn stored() -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/oracle.json");
+        let text = std::fs::read_to_string(path).expect("it is in the repository");
+        serde_json::from_str(&text).expect("as the oracle writes it")
+    }
 }
 
 #[derive(Deserialize)]
@@ -54,9 +64,7 @@ fn tolerance(case: &Case) -> f64 {
 
 #[test]
 fn costs_and_gradients_have_the_digits_that_they_should() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/oracle.json");
-    let text = std::fs::read_to_string(path).expect("it is in the repository");
-    let Oracle { cases } = serde_json::from_str(&text).expect("as the oracle writes it");
+    let cases = Oracle::stored().cases;
     assert_eq!(cases.len(), 28);
     for case in &cases {
         let readings = case.readings();
@@ -86,5 +94,52 @@ fn noise_whose_powers_are_no_numbers_is_refused() {
     for noise_std_k in [[1e-301, 0.1], [0.1, 1e-141], [0.1, 1e141]] {
         let refused = Whitened::new(&readings, Discretisation::ZeroOrderHold, noise_std_k);
         assert!(matches!(refused, Err(CostError::OutOfRange { .. })), "{noise_std_k:?}");
+    }
+}
+
+#[derive(Deserialize)]
+struct GasCase {
+    name: String,
+    time_s: Vec<f64>,
+    y1: Vec<f64>,
+    y2: Vec<f64>,
+    tau_s: [f64; 2],
+    noise_std_k: [f64; 2],
+    gas_std_k: f64,
+    corner_hz: f64,
+    gas_k: Vec<f64>,
+    std_k: Vec<f64>,
+}
+
+impl GasCase {
+    /// What rounding may take of a mean, in standard deviations, and of a standard deviation: a variance of the body that was four times
+    /// that of the gas becomes one of the noise, and keeps a rounding of what it was, for each of four numbers of the state and each sample.
+    /// Where the noise is less than some 1e-5 of the gas, that leaves no bound; half of the digits are asked for.
+    fn tolerance(&self) -> f64 {
+        let least_k = self.noise_std_k[0].min(self.noise_std_k[1]);
+        let span = 4.0 * (self.gas_std_k / least_k).powi(2);
+        (4.0 * self.time_s.len() as f64 * f64::EPSILON * span).min(f64::EPSILON.sqrt())
+    }
+}
+
+#[test]
+fn gas_temperatures_have_the_digits_that_they_should() {
+    let cases = Oracle::stored().gas;
+    assert_eq!(cases.len(), 20);
+    for case in &cases {
+        let readings =
+            gas::Readings::new(case.time_s.clone(), [case.y1.clone(), case.y2.clone()]).expect("sound readings");
+        let rig = gas::Rig::new([0, 1].map(|i| gas::Sensor::new(case.tau_s[i], case.noise_std_k[i])));
+        let term = gas::Term::Rough { std_k: case.gas_std_k, corner_hz: case.corner_hz };
+        let prior = gas::Prior { level_c: 300.0, terms: vec![term] };
+        let got = gas::reconstruct(&readings, &rig, &prior, gas::Form::Smoother).expect("a sound rig");
+        let tolerance = case.tolerance();
+        for k in 0..case.time_s.len() {
+            let of_mean = (got.gas_c[k] - 300.0 - case.gas_k[k]).abs() / case.std_k[k];
+            let of_std = (got.std_k[k] / case.std_k[k] - 1.0).abs();
+            let what = format!("{}, sample {k}, within {tolerance:.1e}", case.name);
+            assert!(of_mean < tolerance, "{what}: gas {} for {}, {of_mean:.1e}", got.gas_c[k] - 300.0, case.gas_k[k]);
+            assert!(of_std < tolerance, "{what}: std {} for {}, {of_std:.1e}", got.std_k[k], case.std_k[k]);
+        }
     }
 }
