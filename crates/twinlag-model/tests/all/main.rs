@@ -2,6 +2,7 @@
 
 mod mismatch;
 mod missing;
+mod no_size;
 mod saturation;
 mod scatter;
 mod twins;
