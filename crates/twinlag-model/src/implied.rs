@@ -12,9 +12,12 @@ use crate::plant::Plant;
 use crate::rows::Rows;
 use crate::whitening::{Factor, Variance};
 
-/// A disagreement that is this many times less certain than most says nothing: it rests on a masked reading, whose
+/// Of unevenly spaced readings a disagreement that is this many times less certain than most says nothing: it rests on a masked reading, whose
 /// noise is some hundred times that of the others.
 const UNINFORMED_RATIO: f64 = 10.0;
+/// Of evenly spaced readings one that is this many times less certain than the most certain one: three quarters of its variance are those of
+/// a masked reading. Noise of a missing reading is larger than what it is off, and what rests on it has less than the variance of the others.
+const UNINFORMED_EVEN_RATIO: f64 = 2.0;
 /// Samples around the middle of a record, beside the reach of a delay, from which the paths of noise are taken.
 const PATH_SAMPLES: usize = 16;
 
@@ -184,7 +187,8 @@ impl Plant {
             if is_all_informed(&observations.stretches[stretch], observations.period_s.is_some()) {
                 out.is_informed.resize(out.is_informed.len() + residual.len(), true);
             } else {
-                out.is_informed.extend(is_informed((0..residual.len()).map(|k| factor.row(k)[0]).collect()));
+                let scales = (0..residual.len()).map(|k| factor.row(k)[0]).collect();
+                out.is_informed.extend(is_informed(scales, observations.period_s.is_some()));
             }
             let mut weighted = residual.clone();
             factor.unwhiten_transposed(&mut weighted);
@@ -267,9 +271,14 @@ pub(crate) fn is_all_informed(stretch: &Stretch, is_even: bool) -> bool {
 /// Whether each of the disagreements of a stretch says anything.
 ///
 /// - `scales`: standard deviation of each, given those before it, K
-pub(crate) fn is_informed(scales: Vec<f64>) -> Vec<bool> {
-    let typical = median(scales.clone());
-    scales.into_iter().map(|scale| scale < UNINFORMED_RATIO * typical).collect()
+/// - `is_even`: whether readings are evenly spaced
+pub(crate) fn is_informed(scales: Vec<f64>, is_even: bool) -> Vec<bool> {
+    let most = if is_even {
+        UNINFORMED_EVEN_RATIO * scales.iter().copied().fold(f64::INFINITY, f64::min)
+    } else {
+        UNINFORMED_RATIO * median(scales.clone())
+    };
+    scales.into_iter().map(|scale| scale < most).collect()
 }
 
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {

@@ -466,7 +466,8 @@ impl Model {
         let of_piece = evaluator.pieces.iter().flat_map(|piece| {
             let all = first..first + piece.count;
             first = all.end;
-            let informed = if is_all { vec![true; piece.count] } else { is_informed(scales[all.clone()].to_vec()) };
+            let informed =
+                if is_all { vec![true; piece.count] } else { is_informed(scales[all.clone()].to_vec(), is_even) };
             (piece.first_sample..).zip(evaluator.residual[all].iter().copied().zip(informed))
         });
         runs_of(of_piece, holds)
