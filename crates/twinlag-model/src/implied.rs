@@ -12,12 +12,12 @@ use crate::plant::Plant;
 use crate::rows::Rows;
 use crate::whitening::{Factor, Variance};
 
-/// Of unevenly spaced readings a disagreement that is this many times less certain than most says nothing: it rests on a masked reading, whose
+/// A disagreement that is this many times less certain than most says nothing: it rests on a wrong reading, whose
 /// noise is some hundred times that of the others.
 const UNINFORMED_RATIO: f64 = 10.0;
-/// Of evenly spaced readings one that is this many times less certain than the most certain one: three quarters of its variance are those of
-/// a masked reading. Noise of a missing reading is larger than what it is off, and what rests on it has less than the variance of the others.
-const UNINFORMED_EVEN_RATIO: f64 = 2.0;
+/// Where readings are missing, one that is this many times less certain than the most certain one says nothing: three quarters of its variance
+/// are those of a missing reading, whose noise is larger than what it is off, so that it varies less than the others.
+const UNINFORMED_BY_MISSING_RATIO: f64 = 2.0;
 /// Samples around the middle of a record, beside the reach of a delay, from which the paths of noise are taken.
 const PATH_SAMPLES: usize = 16;
 
@@ -188,7 +188,7 @@ impl Plant {
                 out.is_informed.resize(out.is_informed.len() + residual.len(), true);
             } else {
                 let scales = (0..residual.len()).map(|k| factor.row(k)[0]).collect();
-                out.is_informed.extend(is_informed(scales, observations.period_s.is_some()));
+                out.is_informed.extend(is_informed(scales, &observations.stretches[stretch]));
             }
             let mut weighted = residual.clone();
             factor.unwhiten_transposed(&mut weighted);
@@ -271,10 +271,9 @@ pub(crate) fn is_all_informed(stretch: &Stretch, is_even: bool) -> bool {
 /// Whether each of the disagreements of a stretch says anything.
 ///
 /// - `scales`: standard deviation of each, given those before it, K
-/// - `is_even`: whether readings are evenly spaced
-pub(crate) fn is_informed(scales: Vec<f64>, is_even: bool) -> Vec<bool> {
-    let most = if is_even {
-        UNINFORMED_EVEN_RATIO * scales.iter().copied().fold(f64::INFINITY, f64::min)
+pub(crate) fn is_informed(scales: Vec<f64>, stretch: &Stretch) -> Vec<bool> {
+    let most = if stretch.has_missing() {
+        UNINFORMED_BY_MISSING_RATIO * scales.iter().copied().fold(f64::INFINITY, f64::min)
     } else {
         UNINFORMED_RATIO * median(scales.clone())
     };

@@ -68,6 +68,11 @@ impl Stretch {
         Self { masked, missing, ..self }
     }
 
+    /// Whether any reading is missing.
+    pub(crate) fn has_missing(&self) -> bool {
+        self.missing.iter().any(|missing| !missing.is_empty())
+    }
+
     /// Whether a reading is missing: it is masked, and what stands in its place lies between its neighbours.
     pub(crate) fn is_missing(&self, channel: usize, sample: usize) -> bool {
         self.missing[channel].binary_search(&sample).is_ok()

@@ -466,8 +466,11 @@ impl Model {
         let of_piece = evaluator.pieces.iter().flat_map(|piece| {
             let all = first..first + piece.count;
             first = all.end;
-            let informed =
-                if is_all { vec![true; piece.count] } else { is_informed(scales[all.clone()].to_vec(), is_even) };
+            let informed = if is_all {
+                vec![true; piece.count]
+            } else {
+                is_informed(scales[all.clone()].to_vec(), &observations.stretches[piece.stretch])
+            };
             (piece.first_sample..).zip(evaluator.residual[all].iter().copied().zip(informed))
         });
         runs_of(of_piece, holds)
