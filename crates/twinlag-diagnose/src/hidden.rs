@@ -103,6 +103,26 @@ pub fn unseen(
     Ok([0, 1, 2].map(|i| std::mem::take(&mut lists[i])))
 }
 
+/// The energy that two lags leave over across the missing readings of a record, over that of the noise, and the probability that noise leaves as
+/// much by chance. At missing readings an estimate from unbroken parts alone is cut, and such parts may all be explained by time constants
+/// that are wrong.
+///
+/// - `tau_s`, `beside`: as in [`unseen`]
+///
+/// # Errors
+/// As [`crate::diagnose()`].
+pub fn energy_across_missing(
+    observations: &Observations,
+    settings: &Settings,
+    tau_s: [f64; 2],
+    beside: &[(Identifier, usize)],
+    watch: Watch<'_>,
+) -> Result<(f64, f64), ModelError> {
+    let prepared = Prepared::new(observations, settings)?;
+    let fitted = Asked { settings, tau_s, beside, watch }.fitted(&prepared);
+    Ok((fitted.mean_energy(), prepared.chance_of_energy(&fitted)))
+}
+
 /// Pieces of a record that is much longer, ever longer ones.
 fn first_looks(observations: &Observations) -> impl Iterator<Item = Observations> {
     let samples = observations.samples();

@@ -75,7 +75,7 @@ pub use evidence::Evidence;
 pub use excitation::{is_single_tone, is_single_tone_in};
 pub use first_state::{FirstState, FirstStateChoice};
 pub use grade::{Basis, Covered, Excess, Grade, Judgement, Number, Reason, RecordScatter, excess};
-pub use hidden::{pieces_of_long, unseen};
+pub use hidden::{energy_across_missing, pieces_of_long, unseen};
 pub use if_known::{Held, HeldEffect, IfKnown};
 pub use joint::{Disagreement, JointDiagnosis, OfRecord, OwnNumber, diagnose_records};
 pub use judge::{Circumstances, Judgements};

@@ -237,6 +237,11 @@ impl Observations {
         self.stretches.iter().map(|s| s.len()).sum()
     }
 
+    /// Whether any reading is missing.
+    pub fn has_missing(&self) -> bool {
+        self.stretches.iter().any(|stretch| stretch.has_missing())
+    }
+
     /// First and last instant, s.
     pub fn ends_s(&self) -> [f64; 2] {
         let first = self.stretches.first().map_or(0.0, |s| s.ends_s()[0]);

@@ -1,5 +1,6 @@
 //! Before the loop: noise levels, defects of the data, and which residuals fit, choose and judge.
 
+use statrs::distribution::{ContinuousCDF, Normal};
 use twinlag_cross_relation::{ResidualTest, total_energy_test};
 
 use crate::blocks;
@@ -206,8 +207,7 @@ impl Prepared {
         if self.observations.has_own_noise() {
             return self.observations.members().iter().any(|member| self.does_leave_less_than_noise(fitted, member));
         }
-        let log_std = (2.0 / fitted.count + self.levels.log_variance_error().powi(2)).sqrt();
-        fitted.mean_energy().ln() < -self.policy.lower_levels_standard_errors * log_std
+        fitted.mean_energy().ln() < -self.policy.lower_levels_standard_errors * self.log_energy_std(fitted)
     }
 
     /// Whether a record with levels of its own leaves less than noise of these levels by more than chance.
@@ -219,6 +219,17 @@ impl Prepared {
         let test = energy_test(&fitted.model, &fitted.theta, &of_member, &self.searched_of(member), error);
         let p_value = LESS_THAN_NOISE_PROBABILITY / self.observations.members().len() as f64;
         test.is_some_and(|test| test.statistic < 1.0 && test.p_value < p_value)
+    }
+
+    /// Probability that noise leaves by chance as much energy as `fitted` does where the gas is seen, of levels as uncertain as they are.
+    pub fn chance_of_energy(&self, fitted: &Fitted) -> f64 {
+        let in_std = fitted.mean_energy().ln() / self.log_energy_std(fitted);
+        Normal::standard().sf(in_std)
+    }
+
+    /// The standard deviation by which the logarithm of the energy that `fitted` leaves over differs by chance from that of the noise.
+    fn log_energy_std(&self, fitted: &Fitted) -> f64 {
+        (2.0 / fitted.count + self.levels.log_variance_error().powi(2)).sqrt()
     }
 
     /// What is searched of a record.

@@ -30,6 +30,7 @@ use crate::setting::Setting;
 use crate::watch::{Stop, UNWATCHED, Watch};
 use conclude::Judged;
 use excerpt::Excerpt;
+use unseen::judge_across_missing;
 pub(super) use unseen::judge_unseen;
 
 /// Both time constants of `record`, with intervals, noise levels and residual tests.
@@ -96,6 +97,7 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
         let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
         answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
     } else {
+        judge_across_missing(&mut answer, &looked_at.observations, options, &stop)?;
         judge_unseen(&mut answer, &looked_at.observations, options, &stop)?;
     }
     Ok(answer)
