@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use crate::{book, cluster, python, report, root, web};
+use crate::{book, cluster, instructions, python, report, root, web};
 
 /// The oldest compiler that is promised: `rust-version` of the workspace.
 const OLDEST: &str = "1.89";
@@ -41,9 +41,22 @@ pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
     if full {
         features()?;
         toolchains()?;
+        if starts("cargo", &["deny", "--version"]) {
+            step("licences and sources", "cargo", &["deny", "--locked", "check", "licenses", "bans", "sources"])?;
+        } else {
+            println!(
+                "== SKIPPED: licences and sources of the dependencies; `cargo install cargo-deny` installs what it takes"
+            );
+        }
         // In release, which has the line tables that a profile is made of.
         step("profiles of a short record", "cargo", &["xtask", "profile", "--quick"])?;
         cluster::run(&cluster::Cluster::default())?;
+        if starts(instructions::EMULATOR, &["--version"]) {
+            step("the program in release", "cargo", &["build", "--release", "--package", "twinlag-cli"])?;
+            instructions::run(&instructions::Instructions::default())?;
+        } else {
+            println!("== SKIPPED: answers on an older processor; they take {}", instructions::EMULATOR);
+        }
         package_and_pages()?;
     }
     Ok(())

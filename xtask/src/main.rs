@@ -1,5 +1,5 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask book`, `cargo xtask experiment`, `cargo xtask measured DIR`,
-//! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask faults`, `cargo xtask cluster`,
+//! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask faults`, `cargo xtask instructions`, `cargo xtask cluster`,
 //! `cargo xtask profile`, `cargo xtask report`, `cargo xtask web`, `cargo xtask python`, `cargo xtask dist`.
 
 mod bench;
@@ -10,6 +10,7 @@ mod dist;
 mod experiment;
 mod faults;
 mod fleet;
+mod instructions;
 mod measured;
 mod profile;
 mod python;
@@ -75,6 +76,8 @@ enum Task {
     Cluster(cluster::Cluster),
     /// Kills the program at moments all over its runs, fills the disk and damages what it keeps: nothing may be lost or half written.
     Faults(faults::Faults),
+    /// Compares answers with those of an older processor, by qemu-x86_64: they may differ by a thousandth of a standard error.
+    Instructions(instructions::Instructions),
     /// Samples where the time of each verb goes, and writes the book's page on it.
     Profile(profile::Profile),
     /// Makes a release archive for a platform, the same to the byte whenever it is made.
@@ -99,6 +102,7 @@ fn main() -> ExitCode {
         Task::Fleet(arguments) => fleet::run(&arguments),
         Task::Cluster(arguments) => cluster::run(&arguments),
         Task::Faults(arguments) => faults::run(&arguments),
+        Task::Instructions(arguments) => instructions::run(&arguments),
         Task::Profile(arguments) => profile::run(&arguments),
         Task::Python(arguments) => python::run(&arguments),
         Task::Report(arguments) => report::run(&arguments),
