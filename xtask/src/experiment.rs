@@ -4,6 +4,7 @@ mod campaign;
 mod coverage;
 mod grades;
 mod loops;
+mod missing;
 mod pair;
 mod planning;
 mod policy;

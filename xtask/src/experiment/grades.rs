@@ -19,10 +19,11 @@ use twinlag_study::{Failure, Merge, Outcome, Quantity, Rate, Results, Study, Tal
 
 use super::keep_last;
 use super::loops::{own_effects, record_of, truth_s};
+use super::missing::Missing;
 use super::stored::{Head, Stored};
 
-/// The experiment of all kinds of records, and that of effects which are not in the library.
-pub(super) const NAMES: [&str; 2] = ["grades", "stretches"];
+/// The experiments of all kinds of records, of effects which are not in the library, and of readings that are missing.
+pub(super) const NAMES: [&str; 3] = ["grades", "stretches", "missing-readings"];
 
 /// A plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,6 +34,9 @@ pub(super) struct Plan {
     seed: u64,
     /// Records of each set.
     records: u64,
+    /// Whether the table says of each group what each verb gives.
+    #[serde(default, skip_serializing_if = "is_not")]
+    by_verb: bool,
     groups: Vec<Group>,
 }
 
@@ -43,6 +47,12 @@ struct Group {
     name: String,
     /// Effects that a record has together.
     sets: Vec<Vec<Kind>>,
+    /// Size of the effects, in place of 1, which any search finds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    size_factor: Option<f64>,
+    /// Readings that the records lack.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    missing: Option<Missing>,
     /// Times as loud as usual that the noise is.
     #[serde(default)]
     noise_factor: Option<f64>,
@@ -172,9 +182,13 @@ impl Study for Plan {
             return Ok(());
         }
         let gas = GasKind::ALL[index as usize % GasKind::ALL.len()];
-        let drawn = group.changed(undeclared(set, 1.0, Some(gas), self.seed + 100_000 * cell as u64 + index)?)?;
-        let simulated = drawn.rig.simulate()?;
+        let seed = self.seed + 100_000 * cell as u64 + index;
+        let drawn = group.changed(undeclared(set, group.size_factor.unwrap_or(1.0), Some(gas), seed)?)?;
+        let mut simulated = drawn.rig.simulate()?;
         let truth_s = truth_s(&drawn, &simulated.time_s, &simulated.gas_c);
+        if let Some(missing) = &group.missing {
+            missing.taken_from(&mut simulated, seed);
+        }
         let mut record = record_of(simulated)?;
         record.reference_c = None;
         let options = Options { best_effort: true, ..Options::default() };
@@ -287,6 +301,13 @@ impl Stored for Plan {
         let sums: Vec<(String, &Tally)> = sums.chain(all.iter().map(|tally| ("**all**".to_owned(), tally))).collect();
         for (name, tally) in &sums {
             let _ = writeln!(text, "| {name} | {} |", row(tally, 0..NUMBERS.len()).join(" | "));
+            if self.by_verb {
+                for (verb, numbers) in
+                    [("diagnose", 0..FIRST_OF_CHARACTERISE), ("characterise", FIRST_OF_CHARACTERISE..NUMBERS.len())]
+                {
+                    let _ = writeln!(text, "| – by {verb} | {} |", row(tally, numbers).join(" | "));
+                }
+            }
         }
         if let Some(all) = &all {
             let parts = [

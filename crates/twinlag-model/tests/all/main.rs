@@ -5,4 +5,5 @@ mod missing;
 mod no_size;
 mod saturation;
 mod scatter;
+mod turbulent;
 mod twins;

@@ -2,36 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use twinlag_model::{
-    Context, Freedom, Identifier, Linearised, Model, Observations, Prepared, Settings, Shared, Stretch, candidates,
-};
+use twinlag_model::{Context, Freedom, Identifier, Linearised, Model, Shared, candidates};
 use twinlag_optimise::Scale;
-use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
 
-const TAU_S: [f64; 2] = [0.012, 0.060];
-const PERIOD_S: f64 = 0.001;
-const SAMPLES: usize = 2000;
-const NOISE_K: f64 = 0.1;
+use crate::turbulent::{NOISE_K, TAU_S, record};
 
 /// Share of the energy of a score that is left of it beside those of a twin: rounding of 1e-16 in each of two scores whose parts in
 /// common are some 1e4 times what differs between two effects leaves up to 1e-24.
 const PARALLEL: f64 = 1e-24;
-
-fn record() -> Prepared {
-    let sensors = [("T1", TAU_S[0]), ("T2", TAU_S[1])].map(|(name, tau_s)| {
-        let mut sensor = Sensor::new(name, tau_s);
-        sensor.noise = Some(Noise::white(NOISE_K));
-        sensor
-    });
-    let turbulence = Turbulence { std_k: 20.0, corner_hz: 2.4, cutoff_hz: 200.0 };
-    let gas = Gas::new(300.0, Signal::Turbulence(turbulence));
-    let rig = Rig::new(4, Record::new(SAMPLES, PERIOD_S), gas, sensors).expect("a rig");
-    let simulated = rig.simulate().expect("finite numbers");
-    let time_s = (0..SAMPLES).map(|k| k as f64 * PERIOD_S).collect();
-    let stretch = Stretch::new(time_s, [simulated.t1_c, simulated.t2_c]);
-    let observations = Observations::new(vec![stretch], Some(PERIOD_S)).expect("finite and long");
-    Prepared::new(&observations, &Settings::default()).expect("a record")
-}
 
 /// Effects whose numbers are those of a rig. What follows the gas needs an estimate of it, and what lies at one frequency a line.
 fn of_rigs(context: &Context) -> Vec<Shared> {
