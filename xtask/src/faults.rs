@@ -69,8 +69,13 @@ pub(crate) fn run(faults: &Faults) -> Result<()> {
     fs::copy(folder.join("one/rig-0000/run-00.csv"), folder.join("record.csv"))?;
     let site = Site { program, folder, kills: faults.kills };
     site.compensation()?;
-    site.resumed(["study", "/results.json"], &["study", "run", "plan.toml", "--out"])?;
-    site.resumed(["batch.csv", ""], &["batch", "fleet", "--out"])?;
+    let to = |run: &[&str], out: &str| run.iter().copied().chain([out]).map(str::to_owned).collect();
+    site.resumed(["study", "/results.json"], |out| to(&["study", "run", "plan.toml", "--resume", "--out"], out))?;
+    site.resumed(["batch.csv", ""], |out| to(&["batch", "fleet", "--resume", "--out"], out))?;
+    site.resumed(["live.csv", ""], |out| {
+        let state = format!("{out}.json");
+        to(&["track", "record.csv", "--live", "1000", "--state", &state, "--out"], out)
+    })?;
     site.live()?;
     damage::run(&site)?;
     full::run(&site)
@@ -84,17 +89,22 @@ struct Site {
 }
 
 impl Site {
-    fn command(&self, arguments: &[&str]) -> Command {
+    fn command(&self, arguments: &[impl AsRef<str>]) -> Command {
         let mut command = Command::new(&self.program);
-        command.args(arguments).arg("--quiet").current_dir(&self.folder).stdin(Stdio::null()).stdout(Stdio::null());
+        command
+            .args(arguments.iter().map(AsRef::as_ref))
+            .arg("--quiet")
+            .current_dir(&self.folder)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null());
         command
     }
 
     /// Runs to the end; returns how long it took.
-    fn whole(&self, arguments: &[&str]) -> Result<Duration> {
+    fn whole(&self, arguments: &[impl AsRef<str>]) -> Result<Duration> {
         let start = Instant::now();
         let status = self.command(arguments).status()?;
-        ensure!(status.success(), "twinlag {} ended with {status}", arguments.join(" "));
+        ensure!(status.success(), "twinlag {} ended with {status}", in_words(arguments));
         Ok(start.elapsed())
     }
 
@@ -104,14 +114,14 @@ impl Site {
     }
 
     /// Runs, and kills after so long what has not ended; returns whether it was killed.
-    fn killed(&self, arguments: &[&str], after: Duration) -> Result<bool> {
+    fn killed(&self, arguments: &[impl AsRef<str>], after: Duration) -> Result<bool> {
         let mut child = self.command(arguments).stderr(Stdio::piped()).spawn()?;
         sleep(after);
         child.kill()?;
         let ended = child.wait_with_output()?;
         let is_killed = ended.status.signal() == Some(SIGKILL);
         let said = String::from_utf8_lossy(&ended.stderr);
-        ensure!(is_killed || ended.status.success(), "twinlag {}: {}: {said}", arguments.join(" "), ended.status);
+        ensure!(is_killed || ended.status.success(), "twinlag {}: {}: {said}", in_words(arguments), ended.status);
         Ok(is_killed)
     }
 
@@ -143,17 +153,18 @@ impl Site {
         self.sweep()
     }
 
-    /// Runs what can go on with `--resume`, is killed over and over, and has to end with the bytes of one run.
+    /// Runs what can go on, is killed over and over, and has to end with the bytes of one run.
     ///
-    /// - `name`, `result`: what `--out` names, behind the number of the series, and the result below that
-    fn resumed(&self, [name, result]: [&str; 2], run: &[&str]) -> Result<()> {
+    /// - `name`, `result`: of the output, behind the number of the series, and the result below that
+    /// - `arguments`: those of a run with this output
+    fn resumed(&self, [name, result]: [&str; 2], arguments: impl Fn(&str) -> Vec<String>) -> Result<()> {
         let out = |series: usize| format!("{series}-{name}");
         let read = |series: usize| self.read(&(out(series) + result));
-        let whole = self.whole(&[run, &[&out(0)]].concat())?;
+        let whole = self.whole(&arguments(&out(0)))?;
         let (mut killed, mut series, mut moment) = (0, 0, Moments::over(whole));
         while killed < self.kills {
             series += 1;
-            while self.killed(&[run, &[&out(series), "--resume"]].concat(), moment.next())? {
+            while self.killed(&arguments(&out(series)), moment.next())? {
                 killed += 1;
             }
             ensure!(read(series).is_some() && read(series) == read(0), "{name}: other bytes after kills");
@@ -194,6 +205,10 @@ impl Site {
         }
         Ok(())
     }
+}
+
+fn in_words(arguments: &[impl AsRef<str>]) -> String {
+    arguments.iter().map(AsRef::as_ref).collect::<Vec<_>>().join(" ")
 }
 
 /// Moments spread evenly over a run and a little beyond it.

@@ -308,6 +308,10 @@ pub(crate) struct Track {
     /// constants of the slower sensor].
     #[arg(long, value_name = "SHARE", requires = "live")]
     pub(crate) change: Option<f64>,
+    /// With --live: keep in this file what is known, and go on from it where it exists: nothing is learned again, of a file the new
+    /// rows are read, and rows are appended to --out.
+    #[arg(long, value_name = "JSON", requires = "live")]
+    pub(crate) state: Option<PathBuf>,
     /// Overwrite output files that exist.
     #[arg(long)]
     pub(crate) force: bool,

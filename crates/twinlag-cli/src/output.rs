@@ -246,7 +246,7 @@ fn file_name(path: &str) -> String {
     Path::new(path).file_name().map_or(path.to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
-fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {
+pub(crate) fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {
     Failure::Other(format!("{}: cannot be written: {error}", path.display()))
 }
 

@@ -17,12 +17,12 @@ use crate::report;
 use crate::several::with_sensors;
 
 pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
+    if let Some(rows) = command.live {
+        return live::run(command, rows as usize, console);
+    }
     let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref(), ..Views::default() };
     let model_file = command.model.as_deref();
     let to_stdout = output::check_data(&command.input.file, model_file, &command.out, &views, command.force, console)?;
-    if let Some(rows) = command.live {
-        return live::run(command, rows as usize, to_stdout, console);
-    }
     let options = TrackOptions {
         characterise: command.input.method.options()?,
         model: model_file.map(model).transpose()?,

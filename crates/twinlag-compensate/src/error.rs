@@ -19,4 +19,8 @@ pub enum CompensateError {
     TooShort { needed: usize, got: usize },
     #[error("the model has {got} states, the largest that is made has {most}: take fewer terms of the gas")]
     TooLarge { got: usize, most: usize },
+    #[error(
+        "what is kept of a tracker is not of these sensors in this gas: the numbers of its states, or of its factors, are others"
+    )]
+    Memory,
 }

@@ -53,6 +53,8 @@ mod filter;
 mod intensity;
 #[cfg(feature = "std")]
 mod learn;
+#[cfg(feature = "std")]
+mod memory;
 mod prior;
 #[cfg(feature = "std")]
 mod readings;
@@ -80,6 +82,8 @@ pub use error::CompensateError;
 pub use intensity::{Intensity, learn_intensity};
 #[cfg(feature = "std")]
 pub use learn::{GasParts, Learned, learn, learn_from, learn_quickly, learn_with_noise};
+#[cfg(feature = "std")]
+pub use memory::TrackerMemory;
 #[cfg(feature = "std")]
 pub use prior::Prior;
 pub use prior::Term;
@@ -113,5 +117,5 @@ const _: () = {
         Sensor,
         Stream<4>,
     )>();
-    is_send_and_sync::<(Tracker<4>, Box<dyn AnyTracker>, TrackerState)>();
+    is_send_and_sync::<(Tracker<4>, Box<dyn AnyTracker>, TrackerMemory, TrackerState)>();
 };

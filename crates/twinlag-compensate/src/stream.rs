@@ -51,18 +51,18 @@ pub struct Stream<const D: usize> {
     step: Step<D>,
     level_c: f64,
     noise_k2: [f64; 2],
-    belief: Belief<D>,
-    is_first: bool,
-    settled: Option<Settled<D>>,
+    pub(crate) belief: Belief<D>,
+    pub(crate) is_first: bool,
+    pub(crate) settled: Option<Settled<D>>,
 }
 
 /// Gains that no longer change.
 #[derive(Clone, Copy, Debug)]
-struct Settled<const D: usize> {
+pub(crate) struct Settled<const D: usize> {
     /// The gain of each reading, and one over the variance of its innovation.
-    gains: [(SVector<f64, D>, f64); 2],
-    variance_k2: f64,
-    innovation_variance: f64,
+    pub(crate) gains: [(SVector<f64, D>, f64); 2],
+    pub(crate) variance_k2: f64,
+    pub(crate) innovation_variance: f64,
 }
 
 impl<const D: usize> Stream<D> {

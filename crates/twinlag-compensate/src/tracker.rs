@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use crate::error::CompensateError;
+use crate::memory::{StreamMemory, TrackerMemory};
 use crate::prior::Prior;
 use crate::rig::Rig;
 use crate::stream::Stream;
@@ -19,6 +21,9 @@ const STUDENT_FREEDOM: f64 = 8.0;
 /// Samples for which a sensor may give no reading before those of the other one weigh no factor: alone they say of it only what is
 /// assumed of the gas, a sensor that is slow and a gas that is calm looking alike. Sensors that are read in turn stay below. Chosen.
 const MOST_ALONE_SAMPLES: u64 = 10;
+
+/// By how much a sum of probabilities may differ from 1: rounding of `FACTORS` of them takes a millionth of this.
+const MAX_ROUNDING: f64 = 1e-8;
 
 /// The gas temperature and the time constants at an instant, from the readings up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,6 +110,31 @@ impl<const D: usize> Tracker<D> {
         }
     }
 
+    /// What the readings so far have made of it.
+    pub fn memory(&self) -> TrackerMemory {
+        TrackerMemory {
+            chance: self.chance.clone(),
+            unread: self.unread,
+            streams: self.streams.iter().map(StreamMemory::of).collect(),
+        }
+    }
+
+    /// Goes on from where another tracker of the same sensors, gas and period was.
+    ///
+    /// # Errors
+    /// [`CompensateError::Memory`] of a tracker with other states, which leaves this one without a meaning.
+    pub fn recall(&mut self, memory: &TrackerMemory) -> Result<(), CompensateError> {
+        let TrackerMemory { chance, unread, streams } = memory;
+        let is_distribution =
+            chance.iter().all(|chance| *chance >= 0.0) && (chance.iter().sum::<f64>() - 1.0).abs() < MAX_ROUNDING;
+        if chance.len() != FACTORS || streams.len() != FACTORS || !is_distribution {
+            return Err(CompensateError::Memory);
+        }
+        self.chance.copy_from_slice(chance);
+        self.unread = *unread;
+        self.streams.iter_mut().zip(streams).try_for_each(|(stream, memory)| memory.put_into(stream))
+    }
+
     /// What is known once the next readings, °C, are; `None` for one that is missing.
     pub fn push(&mut self, reading_c: [Option<f64>; 2]) -> TrackerState {
         let last = FACTORS - 1;
@@ -161,6 +191,15 @@ pub trait AnyTracker: Send + Sync {
 
     /// Goes through so many samples without readings, as [`Tracker::skip`] does.
     fn skip(&mut self, samples: u64);
+
+    /// What the readings so far have made of it.
+    fn memory(&self) -> TrackerMemory;
+
+    /// Goes on from where another one was, as [`Tracker::recall`] does.
+    ///
+    /// # Errors
+    /// [`CompensateError::Memory`].
+    fn recall(&mut self, memory: &TrackerMemory) -> Result<(), CompensateError>;
 }
 
 impl<const D: usize> AnyTracker for Tracker<D> {
@@ -170,6 +209,14 @@ impl<const D: usize> AnyTracker for Tracker<D> {
 
     fn skip(&mut self, samples: u64) {
         Self::skip(self, samples);
+    }
+
+    fn memory(&self) -> TrackerMemory {
+        Self::memory(self)
+    }
+
+    fn recall(&mut self, memory: &TrackerMemory) -> Result<(), CompensateError> {
+        Self::recall(self, memory)
     }
 }
 

@@ -3,12 +3,14 @@
 use std::borrow::Cow;
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use crate::number;
 use crate::serial::Wrapping;
 use crate::sign::Decimal;
 
 /// A program, or an instrument, whose files are known by their first lines.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Program {
     /// Sea-Bird's data processing: `.cnv`.
@@ -31,7 +33,7 @@ impl fmt::Display for Program {
 }
 
 /// How the lines of a file are written, beyond the sign between its cells.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Form {
     pub(crate) program: Option<Program>,
     /// The decimal sign, where the header names it.
@@ -51,7 +53,7 @@ pub(crate) struct Form {
 }
 
 /// Cells that all take the same number of characters, the number on the right of each.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct FixedWidth {
     pub(crate) cells: usize,
     pub(crate) characters: usize,

@@ -1,5 +1,7 @@
 //! Rows that come after those of a table, one line at a time, as a live pipe delivers them.
 
+use serde::{Deserialize, Serialize};
+
 use crate::cells::{is_idle, split};
 use crate::choose::choose;
 use crate::column::Kind;
@@ -24,8 +26,8 @@ pub struct Row {
     pub reading_c: [Option<f64>; 2],
 }
 
-/// Reads further lines in the way that the first ones were read.
-#[derive(Clone, Debug)]
+/// Reads further lines in the way that the first ones were read. It can be kept, as JSON for example, while no lines come.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RowReader {
     source: String,
     text: Text,
@@ -34,7 +36,7 @@ pub struct RowReader {
     channels: [Channel; 2],
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Time {
     index: usize,
     first: f64,
@@ -42,9 +44,11 @@ struct Time {
     counting: CountingOn,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Channel {
     index: usize,
+    /// As the header has it.
+    name: String,
     title: String,
     unit: Unit,
 }
@@ -83,6 +87,7 @@ impl RowReader {
         };
         let channels = chosen.channels.map(|index| Channel {
             index,
+            name: column(index).name().to_owned(),
             title: table.title(index),
             unit: column(index).unit().clone(),
         });
@@ -90,7 +95,13 @@ impl RowReader {
         Ok(Self { source: table.source().to_owned(), text, width, time, channels })
     }
 
-    /// The row of line `number`, from 1; `None` for a blank or a comment.
+    /// The same reader, for lines of another source, which errors name.
+    #[must_use]
+    pub fn of_source(self, source: impl Into<String>) -> Self {
+        Self { source: source.into(), ..self }
+    }
+
+    /// The row of line `number`, from 1; `None` for a blank or a comment, and for the header of a logger that was started again.
     ///
     /// # Errors
     /// [`RecordError::CellCount`], [`RecordError::OpenQuote`], [`RecordError::NotANumber`],
@@ -111,8 +122,13 @@ impl RowReader {
         if found != self.width && !(found == self.width + 1 && form.may_follow(&cells[self.width])) {
             return Err(RecordError::CellCount { file: file(), line: number, expected: self.width, found });
         }
+        let cell_of = |channel: &Channel| cells.get(channel.index).map_or("", AsRef::as_ref);
+        let is_name = |channel: &Channel| !channel.name.is_empty() && cell_of(channel).trim() == channel.name.trim();
+        if self.channels.iter().all(is_name) {
+            return Ok(None);
+        }
         let reading = |channel: &Channel| {
-            let cell = cells[channel.index].as_ref();
+            let cell = cell_of(channel);
             let column = channel.title.clone();
             let value = match number::read(form.cell(cell, decimal), decimal) {
                 Value::Missing => return Ok(None),
@@ -131,12 +147,14 @@ impl RowReader {
             }
         };
         let reading_c = [reading(&self.channels[0])?, reading(&self.channels[1])?];
-        let time_s = self.time.as_mut().and_then(|time| match number::read(&cells[time.index], decimal) {
-            Value::Number(value) => {
-                let value = time.counting.next(value);
-                Some(seconds(value - time.first, time.unit_s)).filter(|t| t.is_finite())
+        let time_s = self.time.as_mut().and_then(|time| {
+            match number::read(cells.get(time.index).map_or("", AsRef::as_ref), decimal) {
+                Value::Number(value) => {
+                    let value = time.counting.next(value);
+                    Some(seconds(value - time.first, time.unit_s)).filter(|t| t.is_finite())
+                }
+                Value::Missing | Value::Other => None,
             }
-            Value::Missing | Value::Other => None,
         });
         Ok(Some(Row { time_s, reading_c }))
     }

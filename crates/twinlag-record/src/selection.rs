@@ -4,7 +4,7 @@ use std::convert::Infallible;
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Deserializer, Serialize, de};
 
 use crate::unit::Unit;
 
@@ -94,7 +94,7 @@ pub struct Selection {
     pub time: Option<ColumnRef>,
     /// The unit of a time column of numbers, [`Unit::Time`], which goes before the one in the header; of a clock with two parts, `10:30`, that
     /// of the first.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "write_unit", deserialize_with = "read_unit")]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "read_unit")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
     pub time_unit: Option<Unit>,
     /// The first sensor.
@@ -123,11 +123,6 @@ pub struct Selection {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
 fn is_auto(choice: &SamplingChoice) -> bool {
     *choice == SamplingChoice::Auto
-}
-
-#[expect(clippy::ref_option, reason = "as serde calls it")]
-fn write_unit<S: Serializer>(unit: &Option<Unit>, serializer: S) -> Result<S::Ok, S::Error> {
-    unit.as_ref().map(ToString::to_string).serialize(serializer)
 }
 
 fn read_unit<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Unit>, D::Error> {

@@ -6,6 +6,8 @@
 
 use std::borrow::Cow;
 
+use serde::{Deserialize, Serialize};
+
 use crate::cells::{is_idle, lines, lines_from_end, split};
 use crate::clock;
 use crate::dialect::{Look, look, sniff_delimiter};
@@ -20,7 +22,7 @@ const MIN_SHARE: f64 = 0.9;
 const STAMP_NAME: &str = "clock";
 
 /// What stands around the cells of each line.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Wrapping {
     is_stamped: bool,
     /// The names before the numbers, in order; empty where there are none.

@@ -6,6 +6,7 @@ use std::io::Read;
 use std::path::Path;
 
 use encoding_rs::Encoding;
+use serde::{Deserialize, Serialize};
 
 use crate::cells::{is_idle, line_end, lines, split};
 use crate::column::{Column, Kind};
@@ -31,7 +32,7 @@ pub struct Table {
 }
 
 /// How the lines of a file of text are taken apart.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Text {
     pub(crate) delimiter: Delimiter,
     pub(crate) decimal: Decimal,

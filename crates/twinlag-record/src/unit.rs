@@ -3,6 +3,8 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
 use crate::description::is_description;
 use crate::words::{apart, words};
 
@@ -27,6 +29,23 @@ pub enum Unit {
     },
     /// Any other, as written.
     Other(String),
+}
+
+/// As text that [`Unit::parse`] reads.
+impl Serialize for Unit {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(match self {
+            Self::Unstated => "",
+            Self::Other(text) => text,
+            known => known.symbol(),
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Unit {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer).map(|text| Self::parse(&text))
+    }
 }
 
 impl Unit {

@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use serde::{Deserialize, Serialize};
+
 use crate::sampling;
 
 /// Bits of such a counter: `millis()` and `micros()` have 32, short ones 16.
@@ -49,7 +51,7 @@ pub(crate) fn counted_on(values: &[f64]) -> Cow<'_, [f64]> {
 }
 
 /// Counts on what comes row by row.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct CountingOn {
     /// The longest step on.
     longest: f64,

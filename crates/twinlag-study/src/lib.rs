@@ -76,6 +76,7 @@
 
 mod error;
 mod forest;
+mod hashed;
 mod lock;
 mod moments;
 mod part;
@@ -90,6 +91,7 @@ mod tally;
 
 pub use error::{Gap, StudyError};
 pub use forest::{Forest, ForestError, Merge};
+pub use hashed::{HashedError, with_hash, without_hash};
 pub use moments::Moments;
 pub use part::{Header, Part, Results, merge};
 pub use pilot::{Pilot, PilotCost, PilotOptions, PilotTime, pilot};

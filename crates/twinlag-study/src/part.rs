@@ -6,10 +6,10 @@ use std::ops::Range;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 
 use crate::error::{Gap, StudyError};
 use crate::forest::{Forest, ForestError};
+use crate::hashed::{HashedError, with_hash, without_hash};
 use crate::replace::replace_file;
 use crate::shard::Shard;
 use crate::study::{Quantity, Study};
@@ -128,14 +128,6 @@ pub struct Part {
     cells: Vec<Forest<Tally>>,
 }
 
-/// The first line of the file of a part.
-#[derive(Serialize, Deserialize)]
-struct FirstLine {
-    schema: String,
-    /// Of all that comes behind this line.
-    sha256: String,
-}
-
 impl Part {
     pub(crate) fn empty(header: Header, shard: Shard, program: &str) -> Self {
         let cells = vec![Forest::new(header.blocks()); header.cells.len()];
@@ -156,20 +148,12 @@ impl Part {
             expected: FILE_SCHEMA.to_owned(),
             got,
         };
-        let end = bytes.iter().position(|byte| *byte == b'\n').map_or(bytes.len(), |end| end + 1);
-        let (first, part) = bytes.split_at(end);
-        let FirstLine { schema, sha256: hash } = serde_json::from_slice(first).map_err(|error| {
+        let part = without_hash(FILE_SCHEMA, &bytes).map_err(|error| match error {
+            HashedError::Schema { got } => other(got),
             // Before there was a first line.
-            let is_of_first_format =
-                serde_json::from_slice::<serde_json::Value>(first).is_ok_and(|part| part["header"]["format"].is_u64());
-            if is_of_first_format { other("1".to_owned()) } else { damaged(error.to_string()) }
+            HashedError::Damaged { .. } if is_of_first_format(&bytes) => other("1".to_owned()),
+            HashedError::Damaged { reason } => damaged(reason),
         })?;
-        if schema != FILE_SCHEMA {
-            return Err(other(schema));
-        }
-        if sha256(part) != hash {
-            return Err(damaged("what it holds does not fit its hash".to_owned()));
-        }
         serde_json::from_slice(part).map_err(|error| damaged(error.to_string()))
     }
 
@@ -199,8 +183,7 @@ impl Part {
     pub fn write(&self, path: &Path) -> Result<(), StudyError> {
         let write = || {
             let part = serde_json::to_string(self)? + "\n";
-            let first = FirstLine { schema: FILE_SCHEMA.to_owned(), sha256: sha256(part.as_bytes()) };
-            replace_file(path, format!("{}\n{part}", serde_json::to_string(&first)?).as_bytes())
+            replace_file(path, with_hash(FILE_SCHEMA, &part).as_bytes())
         };
         write().map_err(|cause| StudyError::Write { path: path.into(), cause })
     }
@@ -313,8 +296,10 @@ fn where_they_differ(one: &str, other: &str) -> (String, String) {
     (part(one), part(other))
 }
 
-fn sha256(bytes: &[u8]) -> String {
-    base16ct::lower::encode_string(&Sha256::digest(bytes))
+/// Whether a file is a part as it was written before there were hashes.
+fn is_of_first_format(file: &[u8]) -> bool {
+    let first = file.split(|byte| *byte == b'\n').next().unwrap_or(file);
+    serde_json::from_slice::<serde_json::Value>(first).is_ok_and(|part| part["header"]["format"].is_u64())
 }
 
 #[derive(Deserialize)]

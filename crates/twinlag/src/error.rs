@@ -79,6 +79,8 @@ pub enum Error {
     LiveEffect { effect: &'static str },
     #[error("live tracking has to start with {why}")]
     LiveStart { why: String },
+    #[error("live tracking cannot go on from this state: {why}")]
+    LiveState { why: String },
     #[error("the model has {what} {got}: expected a finite number above 0")]
     ModelNumber { what: String, got: f64 },
 }

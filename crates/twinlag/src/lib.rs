@@ -101,7 +101,7 @@ pub use reference::AgainstReference;
 pub use rows::rows_of_samples;
 pub use setting::Setting;
 pub use verbs::{
-    CompensateOptions, DiagnoseOptions, Live, LiveAnswer, LiveOptions, TrackOptions, characterise,
+    CompensateOptions, DiagnoseOptions, Live, LiveAnswer, LiveOptions, LiveState, TrackOptions, characterise,
     characterise_records, characterise_records_watched, characterise_watched, characterise_with, compensate,
     compensate_watched, diagnose, diagnose_records, diagnose_records_watched, diagnose_watched, inspect, joined,
     readings, track, track_watched,
@@ -126,5 +126,5 @@ const _: () = {
     const fn may_cross_threads<T: Send + Sync>() {}
     may_cross_threads::<(Characterisation, Diagnosis, Compensation, Track, Model)>();
     may_cross_threads::<(Options, DiagnoseOptions, CompensateOptions, TrackOptions, LiveOptions)>();
-    may_cross_threads::<(Live, LiveAnswer, Error)>();
+    may_cross_threads::<(Live, LiveAnswer, LiveState, Error)>();
 };

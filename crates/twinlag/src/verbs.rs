@@ -20,7 +20,7 @@ pub use compensate::{CompensateOptions, compensate, compensate_watched};
 pub use diagnose::{DiagnoseOptions, diagnose, diagnose_watched};
 pub use diagnose_records::{diagnose_records, diagnose_records_watched};
 pub use inspect::inspect;
-pub use live::{Live, LiveAnswer, LiveOptions};
+pub use live::{Live, LiveAnswer, LiveOptions, LiveState};
 pub use several::joined;
 pub use track::{TrackOptions, track, track_watched};
 pub use with_model::characterise_with;

@@ -23,7 +23,7 @@ fn rig() -> String {
 
 const LIVE: [&str; 6] = ["track", "-", "--live", "1500", "--out", "-"];
 
-fn record(test: &str) -> (Bench, String) {
+pub(crate) fn record(test: &str) -> (Bench, String) {
     let bench = Bench::simulated(test, &rig());
     let text = String::from_utf8(bench.read("run.csv")).expect("text");
     (bench, text)

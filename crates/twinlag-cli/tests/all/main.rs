@@ -12,6 +12,7 @@ mod documents;
 mod explain;
 mod inspect;
 mod live;
+mod live_state;
 mod manners;
 mod plan;
 mod plausibility;

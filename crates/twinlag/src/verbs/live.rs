@@ -1,8 +1,11 @@
 //! Gas temperature and time constants, reading by reading.
 
+mod state;
+
 use std::fmt;
 
-use twinlag_compensate::{AnyTracker, learn, tracker};
+use serde::{Deserialize, Serialize};
+use twinlag_compensate::{AnyTracker, Prior, Rig, learn, tracker};
 use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{Grade, Identifier};
 use twinlag_estimate::spans_too_much;
@@ -12,6 +15,8 @@ use crate::answers::{Characterisation, Model, Status};
 use crate::error::Error;
 use crate::options::Options;
 use crate::verbs::with_model::with_model;
+
+pub use state::LiveState;
 
 /// By how much time constants are taken to change in [`CHANGE_OVER`] time constants of the slower
 /// sensor, where nothing is said.
@@ -69,12 +74,27 @@ pub struct LiveAnswer {
 pub struct Live {
     /// Characterisation of the start.
     pub start: Characterisation,
+    learned: Learned,
     tracker: Box<dyn AnyTracker>,
+    progress: Progress,
+}
+
+/// What the start said, which no later row changes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Learned {
+    rig: Rig,
+    prior: Prior,
+    period_s: f64,
+    change_per_root_s: f64,
     gain: f64,
     offset_k: f64,
     tau_s: [f64; 2],
     log_variance: [f64; 2],
-    period_s: f64,
+}
+
+/// How far the rows have come, and how well they fit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Progress {
     last_s: Option<f64>,
     /// Of a row that was left out, since it was far from the last one.
     elsewhere_s: Option<f64>,
@@ -84,10 +104,9 @@ pub struct Live {
 
 impl fmt::Debug for Live {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { start, tau_s, period_s, last_s, energy, .. } = self;
+        let Self { start, learned, progress, .. } = self;
         let mut out = f.debug_struct("Live");
-        out.field("start", start).field("tau_s", tau_s).field("period_s", period_s);
-        out.field("last_s", last_s).field("energy", energy).finish_non_exhaustive()
+        out.field("start", start).field("learned", learned).field("progress", progress).finish_non_exhaustive()
     }
 }
 
@@ -140,7 +159,7 @@ impl Live {
         let (readings, rig) = extended.rig(extended.parameters())?;
         let [gain, offset_k] = extended.calibration(extended.parameters());
         let prior = learn(&readings, &rig)?.prior;
-        let change = options.change_per_root_s.unwrap_or(CHANGE / (CHANGE_OVER * tau1_s.max(tau2_s)).sqrt());
+        let change_per_root_s = options.change_per_root_s.unwrap_or(CHANGE / (CHANGE_OVER * tau1_s.max(tau2_s)).sqrt());
         if start.status == Status::ModelRejected {
             start.warnings.push(
                 "the start contradicts the model, so the errors of gas temperature and time constants may exceed their bands. A \
@@ -149,23 +168,14 @@ impl Live {
             );
         }
         let period_s = record.sampling.period_s;
-        let tracker = tracker(&rig, &prior, period_s, change).ok_or(Error::LiveEffect { effect: "delay" })?;
+        let tracker =
+            tracker(&rig, &prior, period_s, change_per_root_s).ok_or(Error::LiveEffect { effect: "delay" })?;
         let log_variance = [0, 1].map(|i| {
             let error_s = fit.time_constants[i].standard_error_s.unwrap_or(0.0);
             (error_s / tau_s[i]).powi(2)
         });
-        Ok(Self {
-            start,
-            tracker,
-            gain,
-            offset_k,
-            tau_s,
-            log_variance,
-            period_s,
-            last_s: None,
-            elsewhere_s: None,
-            energy: 1.0,
-        })
+        let learned = Learned { rig, prior, period_s, change_per_root_s, gain, offset_k, tau_s, log_variance };
+        Ok(Self { start, learned, tracker, progress: Progress { last_s: None, elsewhere_s: None, energy: 1.0 } })
     }
 
     /// What is known once a row is read: both readings, °C, `None` for one that is missing, at
@@ -192,23 +202,23 @@ impl Live {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn push(&mut self, time_s: Option<f64>, reading_c: [Option<f64>; 2]) -> Option<LiveAnswer> {
-        let next_s = self.last_s.map_or(0.0, |last_s| last_s + self.period_s);
+        let next_s = self.progress.last_s.map_or(0.0, |last_s| last_s + self.learned.period_s);
         let time_s = time_s.filter(|t| t.is_finite()).unwrap_or(next_s);
         let is_resumed = self.come_to(time_s)?;
         let [first, second] = reading_c.map(|c| c.filter(|c| c.is_finite()));
-        let now = self.tracker.push([first, second.map(|c| (c - self.offset_k) / self.gain)]);
+        let now = self.tracker.push([first, second.map(|c| (c - self.learned.offset_k) / self.learned.gain)]);
         let count = reading_c.iter().flatten().filter(|c| c.is_finite()).count();
         if count > 0 {
-            self.energy += (now.normalised_innovation_squared / count as f64 - self.energy) / WATCHED;
+            self.progress.energy += (now.normalised_innovation_squared / count as f64 - self.progress.energy) / WATCHED;
         }
         // Of two readings a sample half a chi-square of two degrees, whose variance is 1.
-        let excess = self.energy - 1.0 > CLEARLY / (2.0 * WATCHED).sqrt();
-        let widened_by = if excess { self.energy.sqrt() } else { 1.0 };
+        let excess = self.progress.energy - 1.0 > CLEARLY / (2.0 * WATCHED).sqrt();
+        let widened_by = if excess { self.progress.energy.sqrt() } else { 1.0 };
         let is_beyond = now.chance_beyond > LIKELY;
         let factor = now.log_factor.exp();
-        let tau_s = self.tau_s.map(|tau_s| tau_s * factor);
+        let tau_s = self.learned.tau_s.map(|tau_s| tau_s * factor);
         let tau_95_s = [0, 1].map(|i| {
-            let half = widened_by * Z_975 * (now.log_variance + self.log_variance[i]).sqrt();
+            let half = widened_by * Z_975 * (now.log_variance + self.learned.log_variance[i]).sqrt();
             Some([-half, half].map(|by| tau_s[i] * by.exp())).filter(|band| !is_beyond && !spans_too_much(*band))
         });
         Some(LiveAnswer {
@@ -226,19 +236,19 @@ impl Live {
     /// Goes through what is missing between the last row and `time_s`, and says whether that was a long pause or another clock;
     /// `None` where a row at `time_s` is to be left out.
     fn come_to(&mut self, time_s: f64) -> Option<bool> {
-        let steps_from = |from_s: f64| ((time_s - from_s) / self.period_s).round();
+        let steps_from = |from_s: f64| ((time_s - from_s) / self.learned.period_s).round();
         let is_next = |steps: f64| (1.0..=LONGEST_GAP).contains(&steps);
-        let steps = self.last_s.map_or(1.0, steps_from);
+        let steps = self.progress.last_s.map_or(1.0, steps_from);
         let is_resumed = !is_next(steps);
         if is_resumed {
             let is_late = (-MOST_LATE..1.0).contains(&steps);
-            if is_late || !self.elsewhere_s.is_some_and(|from_s| is_next(steps_from(from_s))) {
-                self.elsewhere_s = Some(time_s).filter(|_| !is_late);
+            if is_late || !self.progress.elsewhere_s.is_some_and(|from_s| is_next(steps_from(from_s))) {
+                self.progress.elsewhere_s = Some(time_s).filter(|_| !is_late);
                 return None;
             }
         }
         self.tracker.skip(if steps > 0.0 { steps as u64 - 1 } else { u64::MAX });
-        (self.last_s, self.elsewhere_s) = (Some(time_s), None);
+        (self.progress.last_s, self.progress.elsewhere_s) = (Some(time_s), None);
         Some(is_resumed)
     }
 }
