@@ -1,10 +1,13 @@
 //! Gas temperature and time constants, reading by reading.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde::Deserialize;
-use twinlag::{Live as Inner, LiveOptions, Model, Options};
+use twinlag::record::Record as RecordInner;
+use twinlag::{Live as Inner, LiveOptions, LiveState, Model, Options};
+use twinlag_study::{with_hash, without_hash};
 
 use crate::answer::{Answer, Said};
 use crate::error::of_verb;
@@ -22,6 +25,9 @@ struct Asked {
     change_per_root_s: Option<f64>,
 }
 
+/// Name and number of the layout of a state: a line with the SHA-256 of the next one, which is [`LiveState`].
+const STATE_SCHEMA: &str = "twinlag.live-state-file/1";
+
 /// Both ends of a band, where there is one.
 type Band = Option<(f64, f64)>;
 
@@ -33,6 +39,19 @@ pub(crate) struct Live {
     start: Py<Answer>,
 }
 
+impl Live {
+    /// - `records`: the start, where it is at hand
+    fn of(py: Python<'_>, live: Inner, records: Vec<Arc<RecordInner>>) -> PyResult<Self> {
+        let said = Said::Characterisation(Box::new(live.start.clone()));
+        let start = Py::new(py, Answer { said, records })?;
+        Ok(Self { inner: Mutex::new(live), start })
+    }
+
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 #[pymethods]
 impl Live {
     #[new]
@@ -41,9 +60,25 @@ impl Live {
         let options = LiveOptions { characterise, model, change_per_root_s };
         let record = record.inner.clone();
         let live = py.detach(|| Inner::start(&record, &options)).map_err(|error| of_verb(&error))?;
-        let said = Said::Characterisation(Box::new(live.start.clone()));
-        let start = Py::new(py, Answer { said, records: vec![record] })?;
-        Ok(Self { inner: Mutex::new(live), start })
+        Self::of(py, live, vec![record])
+    }
+
+    /// Goes on from a state.
+    #[staticmethod]
+    fn resumed(py: Python<'_>, state: &str) -> PyResult<Self> {
+        let text =
+            without_hash(STATE_SCHEMA, state.as_bytes()).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let state: LiveState =
+            serde_json::from_slice(text).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let live = Inner::resume(state).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Self::of(py, live, Vec::new())
+    }
+
+    /// What is known now, as text.
+    fn state(&self) -> PyResult<String> {
+        let text = serde_json::to_string(&self.inner().state());
+        let text = text.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(with_hash(STATE_SCHEMA, &(text + "\n")))
     }
 
     /// The characterisation of the start.
@@ -63,8 +98,7 @@ impl Live {
         t2_c: Option<f64>,
         time_s: Option<f64>,
     ) -> Option<(f64, f64, f64, (Option<f64>, Option<f64>), (Band, Band), bool, f64, bool)> {
-        let mut live = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
-        let now = live.push(time_s, [t1_c, t2_c])?;
+        let now = self.inner().push(time_s, [t1_c, t2_c])?;
         let [first, second] = now.tau_s;
         let [band, other] = now.tau_95_s.map(|band| band.map(|[low, high]| (low, high)));
         Some((

@@ -154,6 +154,27 @@ def test_tracks_and_live(rig) -> None:
         tl.Live(tl.simulate(tl.EXAMPLE_RIG.replace("samples = 2500", "samples = 30")))
 
 
+def test_live_goes_on(rig, tmp_path) -> None:
+    live = tl.Live(rig, best_effort=True)
+    rows = list(zip(rig.t1_c, rig.t2_c, rig.time_s))
+    for row in rows[:700]:
+        live.push(*row)
+    path = tmp_path / "live.json"
+    live.save(path)
+    loaded, pickled = tl.load_live(path), pickle.loads(pickle.dumps(live))
+    assert loaded.start.to_dict() == live.start.to_dict()
+    for t1, t2, time_s in rows[700:900]:
+        now = live.push(t1, t2, time_s)
+        assert loaded.push(t1, t2, time_s) == now == pickled.push(t1, t2, time_s)
+    damaged = path.read_text().replace("tau_s", "tau_z", 1)
+    for text in [damaged, "", "{}", '{"schema":"other/1","sha256":""}\n']:
+        path.write_text(text)
+        with pytest.raises(ValueError, match="written by Live.save"):
+            tl.load_live(path)
+    with pytest.raises(FileNotFoundError):
+        tl.load_live(tmp_path / "none.json")
+
+
 def test_pictures(diagnosis, rig) -> None:
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")

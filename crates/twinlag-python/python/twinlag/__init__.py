@@ -20,7 +20,7 @@ from __future__ import annotations
 from twinlag import _core
 from twinlag._answers import Answer, Characterisation, Compensation, Diagnosis, Track
 from twinlag._errors import RecordError
-from twinlag._live import Live, LiveAnswer
+from twinlag._live import Live, LiveAnswer, load_live
 from twinlag._model import Model, load_model
 from twinlag._part import Effect, Part, Sensor, Sensors
 from twinlag._record import Record, read
@@ -69,6 +69,7 @@ __all__ = [
     "characterise",
     "compensate",
     "diagnose",
+    "load_live",
     "load_model",
     "read",
     "simulate",

@@ -59,10 +59,19 @@ class Live:
         sensor, whether they may have left the range that is tracked, what the bands were multiplied by, and whether there was a long pause; `None` of a row that is
         left out.
         """
+    @staticmethod
+    def resumed(state: str) -> Live:
+        """
+        Goes on from a state.
+        """
     @property
     def start(self, /) -> Answer:
         """
         The characterisation of the start.
+        """
+    def state(self, /) -> str:
+        """
+        What is known now, as text.
         """
 
 @final

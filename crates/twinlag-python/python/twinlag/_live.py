@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+import os
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from twinlag import _core
 from twinlag._answers import Characterisation
 from twinlag._errors import RecordError
+from twinlag._files import replace
 from twinlag._model import Model
 from twinlag._record import Record
 from twinlag._verbs import Options, _asked, _fields, _one, _options
@@ -103,6 +105,29 @@ class Live:
         """The characterisation of the start."""
         return Characterisation._of(self._inner.start)  # type: ignore[no-any-return]
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write what is known now, for `load_live`. A file that exists is overwritten.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile, twinlag as tl
+        >>> live = tl.Live(tl.simulate(tl.EXAMPLE_RIG))
+        >>> path = pathlib.Path(tempfile.mkdtemp(), "live.json")
+        >>> live.save(path)
+        >>> tl.load_live(path).push(450.0, 451.0) == live.push(450.0, 451.0)
+        True
+        """
+        replace(path, self._inner.state())
+
+    @classmethod
+    def _resumed(cls, state: str) -> Live:
+        live = cls.__new__(cls)
+        live._inner = _core.Live.resumed(state)
+        return live
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Live._resumed, (self._inner.state(),)
+
     def push(self, t1_c: float | None, t2_c: float | None, time_s: float | None = None) -> LiveAnswer | None:
         """Take a row.
 
@@ -129,3 +154,18 @@ class Live:
         first, second = (_reading(c, name) for c, name in ((t1_c, "t1_c"), (t2_c, "t2_c")))
         now = self._inner.push(first, second, time_s)
         return None if now is None else LiveAnswer(*now)
+
+
+def load_live(path: str | os.PathLike[str]) -> Live:
+    """Go on from where `Live.save` was called: rows that come after get the answers, to the last bit, that they would have got there.
+
+    Raises
+    ------
+    ValueError
+        It is no such file, or it is damaged.
+    """
+    try:
+        with open(path, encoding="utf-8") as file:
+            return Live._resumed(file.read())
+    except ValueError as error:  # bytes that are no text among them
+        raise ValueError(f"{os.fspath(path)}: expected a state written by Live.save: {error}") from None
