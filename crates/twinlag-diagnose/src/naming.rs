@@ -223,8 +223,8 @@ pub(crate) fn judge_effect(
         Reason::hidden(circumstances.hidden_from_parameters.get(range.start - 2 + index)?, &circumstances.named)
     };
     let basis = circumstances.whole_basis();
-    let cause =
-        (!found.alternatives.is_empty()).then_some(Reason::Cause { effect: found.effect, channel: found.fitted_in });
+    let is_open = !found.alternatives.is_empty() || found.channel != found.fitted_in;
+    let cause = is_open.then_some(Reason::Cause { effect: found.effect, channel: found.fitted_in });
     for (index, value) in found.parameters.iter_mut().enumerate() {
         let is_positive = parameters.get(index).is_some_and(|p| p.variable.scale == Scale::Logarithmic);
         if index >= parameters.len() && value.standard_error.is_none() && !found.effect.is_noise() {

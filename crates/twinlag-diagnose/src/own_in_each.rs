@@ -75,7 +75,7 @@ impl Search<'_> {
 }
 
 /// Every form of an effect with fewer parameters, and the values to start from.
-fn shorter_forms(effect: &Shared, values: &[f64]) -> Vec<(Shared, Vec<f64>)> {
+pub(crate) fn shorter_forms(effect: &Shared, values: &[f64]) -> Vec<(Shared, Vec<f64>)> {
     let each = effect.reduced(values).into_iter().flat_map(|(form, values)| {
         let shorter = shorter_forms(&form, &values);
         std::iter::once((form, values)).chain(shorter)

@@ -129,7 +129,22 @@ fn judged(last: &Characterisation, verdict: Option<Verdict>, effects: &[ModelEff
         let channel = fitted_in.unwrap_or_else(|| channels[1 - trusted].clone());
         Reason::OfOneAlone { effect: effect.effect, channel }
     });
-    of_one_alone.fold(of_lags, |judgement, reason| judgement.and(&reason))
+    // One of the numbers says enough.
+    let of_effects = effects.iter().find_map(follows_effect).filter(|_| of_lags.grade == Grade::Go);
+    of_effects.into_iter().chain(of_one_alone).fold(of_lags, |judgement, reason| judgement.and(&reason))
+}
+
+/// That the gas follows from a number of an effect which is right on a condition. Time constants that hold whichever cause it is say
+/// nothing of the gas, which is another one with each. A number that is not determined leaves the gas as it is, since its band has the
+/// uncertainty of all.
+fn follows_effect(effect: &ModelEffect) -> Option<Reason> {
+    let about = effect.effect.about();
+    let number = effect.parameters.iter().find(|number| number.grade == Some(Grade::Conditional))?;
+    (!about.is_noise && !about.is_defect).then(|| Reason::Follows {
+        from: format!("the {} of {}", number.value.name.replace('_', " "), about.name),
+        grade: Grade::Conditional,
+        because: number.because.clone(),
+    })
 }
 
 /// Writes the gas temperature into the answer.
