@@ -348,7 +348,7 @@ impl<'a> Search<'a> {
             if best.fitted.mean_energy() < self.policy.incomplete_energy {
                 mean.retain(|(_, c)| c.white_gain > self.policy.rival_share * looked.white_gain);
             }
-            finished.extend(self.parts(current, &best, robust_before));
+            finished.extend(self.beside_best(current, &best, robust_before));
             finished.push(best);
         }
         finished.extend(self.each(&mean, |(_, looked)| self.finished(current, looked, robust_before))?);
@@ -390,20 +390,31 @@ impl<'a> Search<'a> {
         Candidate { effect, fitted, runner_up: None, white_gain, robust_gain, ..looked.clone() }
     }
 
-    /// The forms of a candidate that have fewer parameters, fitted from where it has ended.
+    /// The forms of a candidate that have fewer parameters, and its exact twins, fitted from where it has ended.
     ///
     /// A first look is too short for some of them: a gain alone moves both time constants on the way, where an offset beside it takes
     /// what is left meanwhile. Failed: of a wrong gain in slow gas the gain alone had a third of the gain in likelihood after a first
     /// look, and crosstalk was named, which has one parameter as well.
-    fn parts(&self, current: &Fitted, whole: &Candidate, robust_before: f64) -> Vec<Candidate> {
-        let range = whole.fitted.model.range(current.model.effects.len());
-        let (before, values) = whole.fitted.theta.split_at(range.start);
-        let part = |(effect, values): (Shared, Vec<f64>)| {
-            let (model, theta) = (current.model.with(effect.clone()), [before, &values].concat());
-            let start = Fitted { model, theta, ..whole.fitted.clone() };
+    fn beside_best(&self, current: &Fitted, best: &Candidate, robust_before: f64) -> Vec<Candidate> {
+        let (model, place) = (&best.fitted.model, current.model.effects.len());
+        let (before, values) = best.fitted.theta.split_at(model.range(place).start);
+        let parts = shorter_forms(&best.effect, values).into_iter();
+        let parts = parts.map(|(effect, values)| (effect, [before, &values].concat()));
+        let possible = self.candidates(&current.model);
+        let twins = model.twins(place, &best.fitted.theta).into_iter().filter_map(|twin| {
+            let is_it = |effect: &&Shared| {
+                let [parameter] = effect.parameters() else { return false };
+                (effect.identifier(), effect.channel(), parameter.name)
+                    == (twin.effect, Some(twin.channel), twin.parameter)
+            };
+            let effect = possible.iter().find(is_it)?.clone();
+            Some((effect, [&twin.time_constants_s[..], &before[2..], &[twin.value]].concat()))
+        });
+        let fitted = |(effect, theta): (Shared, Vec<f64>)| {
+            let start = Fitted { model: current.model.with(effect.clone()), theta, ..best.fitted.clone() };
             self.finished(current, &self.candidate(&effect, start, 0.0, 0.0), robust_before)
         };
-        shorter_forms(&whole.effect, values).into_iter().map(part).collect()
+        parts.chain(twins).map(fitted).collect()
     }
 
     fn is_far_off(&self, current: &Fitted) -> bool {

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::form::Program;
 use crate::selection::Setting;
-use crate::wording::{Counted, brief, plain, three};
+use crate::wording::{Counted, brief, enumerated, plain, three};
 
 /// Where in the input something is: a line of a file, or a sample of a vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +56,7 @@ impl fmt::Display for Candidates {
         if let Some(chosen) = &self.chosen {
             write!(f, "beside column {chosen}, ")?;
         }
-        let list = self.found.join(", ");
+        let list = enumerated(self.found.len(), |index| self.found[index].clone());
         match self.found.len() {
             0 if !self.are_named => write!(f, "no column without a name may be a sensor")?,
             1 if !self.are_named => write!(f, "only column {list}, without a name, may be a sensor")?,
@@ -96,10 +96,14 @@ pub enum RecordError {
     #[error("{file}: is empty, expected a header and rows of time and two temperatures")]
     Empty { file: String },
     #[error(
-        "{file}: has no row of numbers in its {counted}, expected rows under the header; was the logger started?",
+        "{file}: has no row of numbers in the first {counted}, expected rows under the header; was the logger started?",
         counted = Counted(*lines, "line")
     )]
     NoData { file: String, lines: usize },
+    #[error("{file}: line {line} is longer than {most} bytes; expected rows of text, each ended by a line break")]
+    LongLine { file: String, line: usize, most: usize },
+    #[error("{file}: has {found} columns, expected at most {most}; keep the time and the temperatures alone")]
+    TooManyColumns { file: String, found: usize, most: usize },
     #[error(
         "{file}: line {line}: found one column, expected two temperatures and a time, separated by comma, semicolon, \
          tab, pipe or blanks; put both channels side by side in one file"

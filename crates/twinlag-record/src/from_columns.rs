@@ -11,7 +11,7 @@ use crate::column::{Column, Kind};
 use crate::names;
 use crate::note::Note;
 use crate::sign::Decimal;
-use crate::table::{Places, Table};
+use crate::table::{Places, Table, check_columns};
 use crate::unit::Unit;
 
 /// A column with its name, its unit and one value for each row.
@@ -158,7 +158,7 @@ impl Table {
     ///
     /// # Errors
     /// [`RecordError::Empty`] if there is no column or no row, [`RecordError::LengthMismatch`] if
-    /// columns differ in length.
+    /// columns differ in length, [`RecordError::TooManyColumns`].
     pub fn from_columns(
         source: impl Into<String>,
         columns: impl IntoIterator<Item = NamedColumn>,
@@ -169,6 +169,7 @@ impl Table {
             "" => format!("column {}", index + 1),
             name => format!("column {} '{name}'", index + 1),
         };
+        check_columns(columns.len(), &file)?;
         let rows = columns.first().map_or(0, NamedColumn::len);
         if let Some(odd) = columns.iter().position(|column| column.len() != rows) {
             let (name, like, found) = (title(odd), title(0), columns[odd].len());

@@ -5,6 +5,7 @@
 //! number in it.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 use crate::RecordError;
 use crate::cells::{is_idle, lines, lines_from_end, split, uncommented};
@@ -109,9 +110,9 @@ impl Layout {
             // above them.
             let mut top = bottom;
             while top > 0
-                && head[top].2.iter().all(|cell| is_unit_cell(cell))
                 && counts(&head[top - 1].2).is_some()
                 && is_text_row(&head[top - 1].2)
+                && is_unit_row(&head[top].2, &head[top - 1].2)
             {
                 top -= 1;
             }
@@ -208,6 +209,20 @@ fn units_of(cells: &[Cow<'_, str>]) -> Vec<Unit> {
     let is_of_processing = cells.iter().any(|cell| is_word(cell) && !is_minute(cell));
     let is_unit = |cell: &str| !is_processing(cell) || (is_minute(cell) && !is_of_processing);
     cells.iter().map(|cell| if is_unit(cell) { Unit::parse(cell) } else { Unit::Unstated }).collect()
+}
+
+/// Whether cells are units or words of processing, below those of `above`: all of them, or one of a temperature among cells of which some
+/// are equal, as names are not. Campbell's loggers write any word there: `Volts`, `Deg C`.
+fn is_unit_row(cells: &[Cow<'_, str>], above: &[Cow<'_, str>]) -> bool {
+    let is_temperature =
+        |cell: &Cow<'_, str>| matches!(Unit::parse(cell), Unit::Celsius | Unit::Kelvin | Unit::Fahrenheit);
+    cells.iter().all(|cell| is_unit_cell(cell))
+        || (cells.iter().any(is_temperature) && !are_all_different(cells) && are_all_different(above))
+}
+
+fn are_all_different(cells: &[Cow<'_, str>]) -> bool {
+    let mut seen = BTreeSet::new();
+    cells.iter().filter(|cell| !cell.trim().is_empty()).all(|cell| seen.insert(cell.trim()))
 }
 
 fn is_unit_cell(cell: &str) -> bool {

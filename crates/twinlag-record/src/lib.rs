@@ -87,6 +87,6 @@ pub use rows::{Row, RowReader};
 pub use sampling::{Sampling, SamplingKind};
 pub use selection::{ColumnRef, SamplingChoice, Selection, Setting};
 pub use sign::{Decimal, Delimiter};
-pub use table::Table;
+pub use table::{MAX_LINE_BYTES, Table};
 pub use unit::Unit;
 pub use write::{Decimals, TextColumn, write_csv, write_csv_with_text};

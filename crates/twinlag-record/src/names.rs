@@ -91,9 +91,9 @@ const QUALITY: [&str; 5] = ["qc", "qf", "flag", "flags", "quality"];
 /// Never T1 or T2, unless there are two of them: `Gas T fine`, `Gas T coarse`.
 const GAS: [&str; 2] = ["gas", "tgas"];
 /// Perhaps a sensor, perhaps its surroundings: only the caller knows.
-pub(crate) const SURROUNDINGS: [&str; 16] = [
+pub(crate) const SURROUNDINGS: [&str; 18] = [
     "chamber", "ambient", "room", "bath", "oven", "furnace", "block", "housing", "case", "board", "cjc", "junction",
-    "internal", "raum", "kammer", "ofen",
+    "internal", "panel", "ptemp", "raum", "kammer", "ofen",
 ];
 
 /// Other quantities that are often written without their unit.

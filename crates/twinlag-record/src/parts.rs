@@ -5,6 +5,7 @@ use std::io::Read;
 use encoding_rs::{Encoding, UTF_8};
 
 use crate::RecordError;
+use crate::table::MAX_LINE_BYTES;
 use crate::{encoding, gzip};
 
 /// Bytes that are looked at before the rest is read: some ten thousand rows of any logger.
@@ -59,6 +60,10 @@ impl<'a, R: Read> Parts<'a, R> {
         let Some(end) = memchr::memrchr(b'\n', &self.bytes).filter(|_| !self.is_at_end && !is_utf_16) else {
             return Ok(None);
         };
+        if self.bytes.len() - end > MAX_LINE_BYTES {
+            let line = memchr::memchr_iter(b'\n', &self.bytes).count() + 1;
+            return Err(RecordError::LongLine { file: self.source.to_owned(), line, most: MAX_LINE_BYTES });
+        }
         let (text, encoding) = encoding::decode(&self.bytes[..=end], self.source)?;
         let text = text.into_owned();
         (self.encoding, self.is_ascii) = (encoding, text.is_ascii());
@@ -81,6 +86,13 @@ impl<'a, R: Read> Parts<'a, R> {
             let kept = self.bytes.len();
             self.read(kept + self.part_bytes)?;
             end = memchr::memrchr(b'\n', &self.bytes[kept..]).map(|end| kept + end + 1);
+            if end.is_none() && self.bytes.len() > MAX_LINE_BYTES {
+                return Err(RecordError::LongLine {
+                    file: self.source.to_owned(),
+                    line: seen + 1,
+                    most: MAX_LINE_BYTES,
+                });
+            }
         }
         let end = if self.is_at_end { self.bytes.len() } else { end.unwrap_or(self.bytes.len()) };
         if end == 0 {

@@ -19,7 +19,13 @@ use crate::parts::Parts;
 use crate::row_lines::RowLines;
 use crate::selection::ColumnRef;
 use crate::sign::{Decimal, Delimiter};
+use crate::wording::enumerated;
 use crate::{Place, RecordError, encoding, gzip};
+
+/// Longest line that is read, in bytes. What has no line breaks would otherwise fill the memory.
+pub const MAX_LINE_BYTES: usize = 1 << 20;
+/// Most columns that are read; chosen: beyond what any logger writes, and no more than a page can list.
+const MAX_COLUMNS: usize = 10_000;
 
 /// Delimited text as loggers write it, taken apart: columns of numbers, of date-times, of text.
 #[derive(Clone, Debug)]
@@ -314,9 +320,9 @@ impl Table {
         }
     }
 
-    /// All columns in messages.
+    /// The columns in messages.
     pub(crate) fn listing(&self) -> String {
-        (0..self.columns.len()).map(|index| self.title(index)).collect::<Vec<_>>().join(", ")
+        enumerated(self.columns.len(), |index| self.title(index))
     }
 }
 
@@ -337,10 +343,23 @@ struct Look {
 
 impl Look {
     fn at(text: &str, source: &str) -> Result<Self, RecordError> {
+        let too_long = lines(text).find(|(_, line)| line.len() > MAX_LINE_BYTES);
+        if let Some((line, _)) = too_long {
+            return Err(RecordError::LongLine { file: source.to_owned(), line, most: MAX_LINE_BYTES });
+        }
         let layout = Layout::find(text, source)?;
+        check_columns(layout.width, source)?;
         let decimal = layout.form.decimal.map_or_else(|| sniff_decimal(text, &layout, source), Ok)?;
         Ok(Self { layout, decimal })
     }
+}
+
+/// That no more columns are there than are read.
+pub(crate) fn check_columns(found: usize, source: &str) -> Result<(), RecordError> {
+    if found > MAX_COLUMNS {
+        return Err(RecordError::TooManyColumns { file: source.to_owned(), found, most: MAX_COLUMNS });
+    }
+    Ok(())
 }
 
 /// Looks at 500 rows, or at as many more as it takes to see a decimal sign.

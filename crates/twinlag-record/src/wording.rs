@@ -12,6 +12,18 @@ impl Display for Counted {
     }
 }
 
+/// Things that a message lists before it says how many more there are.
+const MAX_LISTED: usize = 40;
+
+/// `count` things, each by its title: the first of them, and how many more there are.
+pub(crate) fn enumerated(count: usize, title: impl FnMut(usize) -> String) -> String {
+    let mut parts: Vec<String> = (0..count.min(MAX_LISTED)).map(title).collect();
+    if count > MAX_LISTED {
+        parts.push(format!("and {} more", count - MAX_LISTED));
+    }
+    parts.join(", ")
+}
+
 /// A number with the fewest digits that give it again, and with an exponent where it would be all
 /// zeros: `1e37`.
 pub(crate) fn plain(value: f64) -> String {

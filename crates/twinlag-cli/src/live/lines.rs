@@ -5,12 +5,9 @@ use std::io::{BufRead, BufReader, Read as _, Seek as _, SeekFrom, stdin};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use twinlag::record::{RecordError, Table};
+use twinlag::record::{MAX_LINE_BYTES, RecordError, Table};
 
 use crate::failure::Failure;
-
-/// Longest line that is read, in bytes: that of fifty thousand columns. What sends no line breaks would otherwise fill the memory.
-const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// How far an input was read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,11 +74,9 @@ impl Lines {
         let before = to.len();
         let read = (&mut self.from).take(MAX_LINE_BYTES as u64 + 1).read_until(b'\n', to);
         let read = read.map_err(|e| RecordError::CannotRead { file: self.name.clone(), reason: e.to_string() })?;
-        let (name, number) = (&self.name, self.position.lines + 1);
         if read > MAX_LINE_BYTES {
-            return Err(Failure::File(format!(
-                "{name}: line {number} is longer than {MAX_LINE_BYTES} bytes: expected rows of text, each ended by a line break"
-            )));
+            let (file, line) = (self.name.clone(), self.position.lines + 1);
+            return Err(RecordError::LongLine { file, line, most: MAX_LINE_BYTES }.into());
         }
         if read == 0 || (self.whole_only && to.last() != Some(&b'\n')) {
             to.truncate(before);

@@ -144,6 +144,9 @@ def times(values: Any, unit: str) -> Column:
     array = _one_dimensional(_without_zone(values), "time")
     if array.dtype == object and len(array) and isinstance(array[0], datetime.datetime):
         utc = datetime.timezone.utc
+        zoned = [bool(getattr(stamp, "tzinfo", None)) for stamp in array if not _is_missing(stamp)]
+        if any(zoned) and not all(zoned):
+            raise RecordError("time: expected instants that all have a zone, or none, got both: say which zone those without one are of")
 
         def naive(stamp: Any) -> Any:
             return stamp.astimezone(utc).replace(tzinfo=None) if getattr(stamp, "tzinfo", None) else stamp

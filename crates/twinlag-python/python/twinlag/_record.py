@@ -326,7 +326,11 @@ def _columns_of(frame: Any) -> list[Column]:
         is_of_time = kind in {"m", "M"} or getattr(index, "tz", None) is not None or is_rising
         if index.name is not None or is_of_time:
             columns.append(_column(index.name if index.name is not None else "time", "", index))
-    columns.extend(_column(_name(name), "", frame[name]) for name in frame.columns)
+    # Two columns may have one name: in pandas a place gives one of them.
+    at_place = getattr(frame, "iloc", None)
+    for place, name in enumerate(frame.columns):
+        values = frame[name] if at_place is None else at_place[:, place]
+        columns.append(_column(_name(name), "", values))
     return columns
 
 

@@ -317,7 +317,9 @@ def compensate(
     sensors = _places(record.channels)
     trusted = record.channels[0] if trust is None else trust
     _expect((trusted,), tuple(sensors), "trust")
-    its_form: Any = form if form in ("smoother", "filter") else {"fixed-lag": count(form, "form")}
+    if isinstance(form, str):
+        _expect((form,), ("smoother", "filter"), "form")
+    its_form: Any = form if isinstance(form, str) else {"fixed-lag": count(form, "form")}
     if model is not None and _names(without):
         raise ValueError("without: of a diagnosis; with a model there is none, and the effects are those of the model")
     others = {"model": _fields(model), "form": its_form, "trusted": sensors[trusted], "without": list(_names(without))}

@@ -57,6 +57,18 @@ fn campbell_headers_are_read() {
     assert_eq!(got.channels, ["T1_Avg", "T2_Avg"]);
 }
 
+/// Failed: of a row of units with a word such as `Volts` the names were made.
+#[test]
+fn campbell_headers_may_have_any_units() {
+    let header = "\"TOA5\",\"CR1000X\",\"CR1000X\",\"2233\",\"CR1000X.Std.05\"\n\
+                  \"TIMESTAMP\",\"RECORD\",\"TC_fine\",\"TC_coarse\",\"Batt_V\"\n\
+                  \"TS\",\"RN\",\"Deg C\",\"Deg C\",\"Volts\"\n\"\",\"\",\"Smp\",\"Smp\",\"Smp\"";
+    let got = record(&rows(header, |k, t, a, b| format!("\"2026-01-31 10:00:{t:04.1}\",{k},{a},{b},12.6")));
+    assert_is_the_rig(&got, 0.0);
+    assert_eq!(got.channels, ["TC_fine", "TC_coarse"]);
+    assert!(!notes(&got).contains("names no unit"), "{}", notes(&got));
+}
+
 #[test]
 fn a_commented_header_is_a_header() {
     let got = record(&rows("# time_s,T1,T2", |_, t, a, b| format!("{t},{a},{b}")));

@@ -1,7 +1,9 @@
 //! What cannot be read in one way only is refused, with place and remedy.
 
 use crate::common::{FILE, assert_says, plain, record, record_with, refusal, refusal_with, rows};
-use twinlag_record::{Channels, ColumnRef, Record, SamplingChoice, Selection, Table, Unit};
+use twinlag_record::{
+    Channels, ColumnRef, MAX_LINE_BYTES, Record, RecordError, SamplingChoice, Selection, Table, Unit,
+};
 
 #[expect(clippy::unnecessary_wraps, reason = "as the fields of a selection are")]
 fn pick(text: &str) -> Option<ColumnRef> {
@@ -481,4 +483,22 @@ fn names_over_several_lines_are_refused() {
     let error = Table::read(text.as_bytes(), "sheet.csv").expect_err("which names?");
     assert_eq!(error.line(), Some(("sheet.csv", 1)), "{error}");
     assert!(error.to_string().contains("put each name of a column on one line"), "{error}");
+}
+
+/// A line that fills the memory, wherever it stands, and columns that nobody can choose from.
+#[test]
+fn what_is_beyond_any_logger_is_refused() {
+    let long = "1".repeat(MAX_LINE_BYTES + 1);
+    for text in [
+        plain() + &long,
+        format!("# {long}\n{}", plain()),
+        plain() + &long.repeat(5) + "\n",
+        plain().repeat(200_000) + &long.repeat(2),
+    ] {
+        let error = Table::from_reader(text.as_bytes(), FILE).expect_err("a line of a megabyte");
+        assert!(matches!(error, RecordError::LongLine { .. } | RecordError::CellCount { .. }), "{error}");
+        assert_says(&error.to_string(), &["line"]);
+    }
+    let wide = |cell: &str| vec![cell; 10_001].join(",") + "\n";
+    assert_says(&refusal(&(wide("T") + &wide("20.5").repeat(9))), &["10001 columns", "at most 10000"]);
 }
