@@ -60,6 +60,10 @@ pub struct ModelEffect {
     pub channel: Option<String>,
     /// Its parameters.
     pub parameters: Vec<ModelNumber>,
+    /// Effects that explained the record as well, the effect itself among them where it may be in the other channel; none in files of earlier
+    /// versions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub alternatives: Vec<Identifier>,
 }
 
 /// A number of an effect of a [`Model`]: there also where it may not be used.
@@ -90,7 +94,8 @@ impl ModelEffect {
         let channel = found.fitted_in.map(|i| channels[i].clone());
         let numbers = found.parameters.iter().zip(&found.judgements);
         let parameters = numbers.map(|(value, judgement)| ModelNumber::of(value.clone(), judgement)).collect();
-        Self { effect: found.effect, channel, parameters }
+        let alternatives = alternatives(found.effect, &found.alternatives, found.channel == found.fitted_in);
+        Self { effect: found.effect, channel, parameters, alternatives }
     }
 
     /// An effect with the numbers that an answer gives of it.
@@ -99,8 +104,16 @@ impl ModelEffect {
             let EffectNumber { name, value, standard_error, interval_95, unit, judgement } = p.clone();
             Some(ModelNumber::of(Value { name, value: value?, standard_error, interval_95, unit }, &judgement))
         });
-        Self { effect: effect.effect, channel: effect.fitted_in.clone(), parameters: values.collect() }
+        let alternatives = alternatives(effect.effect, &effect.alternatives, effect.channel == effect.fitted_in);
+        Self { effect: effect.effect, channel: effect.fitted_in.clone(), parameters: values.collect(), alternatives }
     }
+}
+
+/// What explains a record as well as `effect` where it was fitted.
+///
+/// - `is_of_one`: whether the other channel is excluded
+fn alternatives(effect: Identifier, others: &[Identifier], is_of_one: bool) -> Vec<Identifier> {
+    others.iter().copied().chain((!is_of_one).then_some(effect)).collect()
 }
 
 impl Model {

@@ -129,22 +129,17 @@ fn judged(last: &Characterisation, verdict: Option<Verdict>, effects: &[ModelEff
         let channel = fitted_in.unwrap_or_else(|| channels[1 - trusted].clone());
         Reason::OfOneAlone { effect: effect.effect, channel }
     });
-    // One of the numbers says enough.
-    let of_effects = effects.iter().find_map(follows_effect).filter(|_| of_lags.grade == Grade::Go);
-    of_effects.into_iter().chain(of_one_alone).fold(of_lags, |judgement, reason| judgement.and(&reason))
+    let of_causes = effects.iter().filter_map(|effect| cause(effect, channels));
+    of_causes.chain(of_one_alone).fold(of_lags, |judgement, reason| judgement.and(&reason))
 }
 
-/// That the gas follows from a number of an effect which is right on a condition. Time constants that hold whichever cause it is say
-/// nothing of the gas, which is another one with each. A number that is not determined leaves the gas as it is, since its band has the
-/// uncertainty of all.
-fn follows_effect(effect: &ModelEffect) -> Option<Reason> {
+/// That a gas temperature is right with this effect, and not with what explains the record as well, if something does. Time constants that hold whichever it is
+/// say nothing of the gas, which is another one with each. What is no property of the sensors leaves it as it is.
+fn cause(effect: &ModelEffect, channels: &[String; 2]) -> Option<Reason> {
     let about = effect.effect.about();
-    let number = effect.parameters.iter().find(|number| number.grade == Some(Grade::Conditional))?;
-    (!about.is_noise && !about.is_defect).then(|| Reason::Follows {
-        from: format!("the {} of {}", number.value.name.replace('_', " "), about.name),
-        grade: Grade::Conditional,
-        because: number.because.clone(),
-    })
+    let channel = effect.channel.as_ref().and_then(|name| channels.iter().position(|channel| channel == name));
+    let is_open = !effect.alternatives.is_empty() && !about.is_noise && !about.is_defect;
+    is_open.then_some(Reason::Cause { effect: effect.effect, channel })
 }
 
 /// Writes the gas temperature into the answer.
