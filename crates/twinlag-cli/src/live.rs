@@ -40,8 +40,8 @@ pub(crate) fn run(command: &Track, rows: usize, console: Console) -> Result<u8, 
     let starts = [0, 1].map(|i| run.live.start.sensors[i].judgement.grade);
     let code = grades::exit_code(&starts, &[], false, command.input.method.strict);
     let followed = run.follow(console);
-    run.keep()?;
-    followed.map(|()| code)
+    let kept = run.keep();
+    followed.and(kept).map(|()| code)
 }
 
 /// Checks the outputs: a file that rows were written to before may be there, and so may the state. Returns whether rows go to standard

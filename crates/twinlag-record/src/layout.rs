@@ -5,7 +5,6 @@
 //! number in it.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
 
 use crate::RecordError;
 use crate::cells::{is_idle, lines, lines_from_end, split, uncommented};
@@ -221,8 +220,9 @@ fn is_unit_row(cells: &[Cow<'_, str>], above: &[Cow<'_, str>]) -> bool {
 }
 
 fn are_all_different(cells: &[Cow<'_, str>]) -> bool {
-    let mut seen = BTreeSet::new();
-    cells.iter().filter(|cell| !cell.trim().is_empty()).all(|cell| seen.insert(cell.trim()))
+    let mut words: Vec<&str> = cells.iter().map(|cell| cell.trim()).filter(|word| !word.is_empty()).collect();
+    words.sort_unstable();
+    words.windows(2).all(|pair| pair[0] != pair[1])
 }
 
 fn is_unit_cell(cell: &str) -> bool {

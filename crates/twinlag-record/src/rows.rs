@@ -95,7 +95,7 @@ impl RowReader {
         Ok(Self { source: table.source().to_owned(), text, width, time, channels })
     }
 
-    /// The same reader, for lines of another source, which errors name.
+    /// This reader for lines of another source, which errors name.
     #[must_use]
     pub fn of_source(self, source: impl Into<String>) -> Self {
         Self { source: source.into(), ..self }

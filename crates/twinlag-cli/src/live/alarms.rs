@@ -7,7 +7,6 @@ use crate::print;
 
 /// Number of warnings about bad rows that are printed one by one.
 const MAX_WARNINGS: usize = 5;
-
 /// Rows for which nothing is to be said before it is said again.
 const QUIET_ROWS: u64 = 1000;
 /// Rows in which a sensor gives no reading before that is said.

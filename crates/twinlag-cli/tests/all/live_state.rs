@@ -27,7 +27,7 @@ fn what_a_file_has_gained_is_added() {
         assert_eq!(answer.code, 0, "{answer:#?}");
         let rows = bench.read("gas.csv");
         let whole_lines = if cut > 0 { count - 1 } else { count };
-        assert!(want.starts_with(&rows) && rows.iter().filter(|b| **b == b'\n').count() == whole_lines, "{count}");
+        assert!(want.starts_with(&rows) && rows.split_inclusive(|b| *b == b'\n').count() == whole_lines, "{count}");
     }
     assert!(bench.read("gas.csv") == want);
     let idle = kept(&bench, "growing.csv", "gas.csv");
