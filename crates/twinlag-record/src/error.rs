@@ -96,7 +96,7 @@ pub enum RecordError {
     #[error("{file}: is empty, expected a header and rows of time and two temperatures")]
     Empty { file: String },
     #[error(
-        "{file}: has no row of numbers in the first {counted}, expected rows under the header; was the logger started?",
+        "{file}: has no row of numbers in its {counted}, expected rows under the header; was the logger started?",
         counted = Counted(*lines, "line")
     )]
     NoData { file: String, lines: usize },
