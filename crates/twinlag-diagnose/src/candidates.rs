@@ -393,8 +393,8 @@ impl<'a> Search<'a> {
     /// The forms of a candidate that have fewer parameters, and its exact twins, fitted from where it has ended.
     ///
     /// A first look is too short for some of them: a gain alone moves both time constants on the way, where an offset beside it takes
-    /// what is left meanwhile. Failed: of a wrong gain in slow gas the gain alone had a third of the gain in likelihood after a first
-    /// look, and crosstalk was named, which has one parameter as well.
+    /// what is left meanwhile. Failed: of a wrong gain in slow gas the gain alone was behind crosstalk after a first look, and crosstalk was
+    /// named, which has one parameter as well.
     fn beside_best(&self, current: &Fitted, best: &Candidate, robust_before: f64) -> Vec<Candidate> {
         let (model, place) = (&best.fitted.model, current.model.effects.len());
         let (before, values) = best.fitted.theta.split_at(model.range(place).start);

@@ -28,6 +28,11 @@ struct Asked {
 /// Name and number of the layout of a state: a line with the SHA-256 of the next one, which is [`LiveState`].
 const STATE_SCHEMA: &str = "twinlag.live-state-file/1";
 
+/// A state that is none.
+fn refused(error: impl ToString) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
 /// Both ends of a band, where there is one.
 type Band = Option<(f64, f64)>;
 
@@ -66,18 +71,15 @@ impl Live {
     /// Goes on from a state.
     #[staticmethod]
     fn resumed(py: Python<'_>, state: &str) -> PyResult<Self> {
-        let text =
-            without_hash(STATE_SCHEMA, state.as_bytes()).map_err(|error| PyValueError::new_err(error.to_string()))?;
-        let state: LiveState =
-            serde_json::from_slice(text).map_err(|error| PyValueError::new_err(error.to_string()))?;
-        let live = Inner::resume(state).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let text = without_hash(STATE_SCHEMA, state.as_bytes()).map_err(refused)?;
+        let state: LiveState = serde_json::from_slice(text).map_err(refused)?;
+        let live = Inner::resume(state).map_err(refused)?;
         Self::of(py, live, Vec::new())
     }
 
     /// What is known now, as text.
     fn state(&self) -> PyResult<String> {
-        let text = serde_json::to_string(&self.inner().state());
-        let text = text.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let text = serde_json::to_string(&self.inner().state()).map_err(refused)?;
         Ok(with_hash(STATE_SCHEMA, &(text + "\n")))
     }
 

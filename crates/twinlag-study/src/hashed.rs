@@ -1,9 +1,8 @@
 //! Text with its hash before it, so that damage shows.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
+use thiserror::Error;
 
 /// The first line.
 #[derive(Serialize, Deserialize)]
@@ -14,31 +13,22 @@ struct FirstLine {
 }
 
 /// Why a file is not text with its hash before it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum HashedError {
     /// It has another schema.
+    #[error("it has the schema {got}")]
     Schema {
         /// That which it has.
         got: String,
     },
     /// It is not whole, or was changed.
+    #[error("{reason}")]
     Damaged {
         /// What is wrong with it.
         reason: String,
     },
 }
-
-impl fmt::Display for HashedError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Schema { got } => write!(f, "it has the schema {got}"),
-            Self::Damaged { reason } => f.write_str(reason),
-        }
-    }
-}
-
-impl std::error::Error for HashedError {}
 
 /// `text` behind a line with the schema and the text's SHA-256.
 ///

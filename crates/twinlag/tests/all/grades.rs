@@ -1,9 +1,10 @@
 //! What is not given because the record does not determine it, and what is right under a condition alone.
 
 use crate::common::{read, record};
-use twinlag::diagnosis::Grade;
+use twinlag::diagnosis::{Grade, Identifier};
 use twinlag::record::Record;
 use twinlag::signal::undeclared::{GasKind, Kind, undeclared};
+use twinlag::signal::{Gas, Noise, Record as Sampling, Rig, Sensor, Series, Signal};
 use twinlag::{CompensateOptions, DiagnoseOptions, Model, compensate, diagnose};
 
 /// Failed: of a second of plunges neither time constant is determined, and the difference of where the fit ended in their valley,
@@ -45,6 +46,50 @@ fn a_gas_temperature_rests_on_the_sensor_that_is_trusted() {
             let condition = format!("right if only {other} has the error named calibration");
             assert!(answer.judgement.because.contains(&condition), "{}", answer.judgement.because);
         }
+    }
+}
+
+/// Sensors that sink through a thermocline with layers, at irregular depths, of which the second reads 1.3 % too little.
+fn two_lags_in_layers() -> Rig {
+    const SAMPLES: usize = 2500;
+    let layer = |depth: f64, j: i32| {
+        let [at, step] = [0.618_034, 0.414_213_6].map(|by| (f64::from(j) * by).fract());
+        0.65 * (step - 0.25) * ((depth - at) / 0.002).tanh()
+    };
+    let gas_c = |k: usize| {
+        let depth = k as f64 / SAMPLES as f64;
+        let thermocline = 22.0 - 6.0 * ((depth - 0.3) / 0.08).tanh() - 8.0 * depth;
+        thermocline - (0..40).map(|j| layer(depth, j)).sum::<f64>()
+    };
+    let values_c = (0..=SAMPLES).map(gas_c).collect();
+    let gas = Gas::new(0.0, Signal::Series(Series::Inline { values_c, period_s: 0.01 }));
+    let mut sensors = [Sensor::new("T1", 0.036), Sensor::new("T2", 0.1)];
+    sensors.iter_mut().zip([0.008, 0.011]).for_each(|(sensor, std_k)| sensor.noise = Some(Noise::white(std_k)));
+    sensors[1].gain = 0.987;
+    Rig::new(1, Sampling::new(SAMPLES, 0.01), gas, sensors).expect("a sound rig")
+}
+
+/// Failed: either sensor may pick up the other, with time constants within the intervals whichever it is. The gas, another one with each, was
+/// go, and so was the share of the one that was named.
+#[test]
+fn a_gas_temperature_rests_on_the_cause_that_is_named() {
+    let record = read(&two_lags_in_layers());
+    let without = vec![Identifier::CALIBRATION];
+    let options = CompensateOptions {
+        diagnose: DiagnoseOptions { without, ..DiagnoseOptions::default() },
+        ..CompensateOptions::default()
+    };
+    let found = compensate(&record, &options).expect("a gas temperature");
+    assert!(found.last.sensors.iter().all(|sensor| sensor.judgement.grade == Grade::Go), "{:?}", found.last.sensors);
+    let [crosstalk] = &found.effects[..] else { panic!("{:?}", found.effects) };
+    assert_eq!((crosstalk.effect, &crosstalk.channel), (Identifier::CROSSTALK, &None));
+    assert_eq!(crosstalk.parameters[0].judgement.grade, Grade::Conditional, "{:?}", crosstalk.parameters);
+    let model = found.model(&record);
+    let again = compensate(&record, &CompensateOptions { model, ..CompensateOptions::default() });
+    for answer in [found, again.expect("a gas temperature")] {
+        assert_eq!(answer.judgement.grade, Grade::Conditional);
+        let because = &answer.judgement.because;
+        assert!(because.contains("right if the cause is crosstalk of T"), "{because}");
     }
 }
 
