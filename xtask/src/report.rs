@@ -1,6 +1,6 @@
 //! Reports in a browser: pages of simulated records are made and opened, at two sizes, light, dark and on paper.
 //!
-//! It takes Chromium, Node.js and two packages of npm, so that no test of a fresh clone rests on it: `cargo xtask report`, and
+//! It takes Chromium, Node.js and three packages of npm, so that no test of a fresh clone rests on it: `cargo xtask report`, and
 //! `cargo xtask ci --full`.
 
 use std::fs;
@@ -91,10 +91,7 @@ pub(crate) fn run(arguments: &Report) -> Result<()> {
         }
         println!("== made {page}");
     }
-    fs::copy(root()?.join("xtask/report/package.json"), dir.join("package.json"))?;
-    if !dir.join("node_modules/axe-core").exists() {
-        step("npm", &["install", "--no-audit", "--no-fund"], &dir)?;
-    }
+    with_packages(&dir)?;
     let script = root()?.join("xtask/report/check.mjs");
     let paths = [&script, &pages_dir, &screenshots, &browser].map(|path| path.display().to_string());
     step("node", &paths.each_ref().map(String::as_str), &dir)?;
@@ -105,6 +102,17 @@ pub(crate) fn run(arguments: &Report) -> Result<()> {
 pub(crate) fn browser(given: Option<&Path>) -> Result<PathBuf> {
     let found = || BROWSERS.iter().map(PathBuf::from).find(|path| path.exists());
     given.map(Path::to_owned).or_else(found).context("no browser: install Chromium, or name one with --browser")
+}
+
+/// The folder of npm's packages below `dir`, once they are there.
+pub(crate) fn with_packages(dir: &Path) -> Result<PathBuf> {
+    let wanted = root()?.join("xtask/report/package.json");
+    let (asked, packages) = (dir.join("package.json"), dir.join("node_modules"));
+    if !packages.exists() || fs::read(&asked).ok() != Some(fs::read(&wanted)?) {
+        fs::copy(wanted, asked)?;
+        step("npm", &["install", "--no-audit", "--no-fund"], dir)?;
+    }
+    Ok(packages)
 }
 
 /// The program, built.
