@@ -366,7 +366,7 @@ impl Search<'_> {
         if has_gas(&others.parts) {
             out.push(others);
         }
-        if let Some(otherwise) = current.parts[i].otherwise() {
+        for otherwise in current.parts[i].otherwise(&self.limits) {
             let mut parts = current.parts.clone();
             parts[i] = otherwise;
             if states(&parts) <= self.room {
@@ -459,7 +459,7 @@ impl Search<'_> {
         };
         let smooth = |frequency_hz| Part::Single(Term::Resonance { std_k: swing_k, frequency_hz, quality: 0.3 });
         [
-            at(&|corner_hz| Part::Turbulent { std_k: swing_k, corner_hz, fastest_hz: 0.5 / period_s }),
+            at(&|corner_hz| Part::Turbulent { std_k: swing_k, corner_hz, fastest_hz: self.limits.fastest_hz() }),
             at(&|corner_hz| Part::Single(Term::Rough { std_k: swing_k, corner_hz })),
             at(&smooth),
         ]
@@ -492,7 +492,7 @@ impl Search<'_> {
             if half >= 16 {
                 let std_k = excess_k(j, half);
                 out.push(Part::Single(Term::Rough { std_k, corner_hz: hz }));
-                out.push(Part::Turbulent { std_k, corner_hz: hz, fastest_hz: 0.5 / self.limits.period_s });
+                out.push(Part::Turbulent { std_k, corner_hz: hz, fastest_hz: self.limits.fastest_hz() });
             }
         }
         out.extend(self.combs(&ratio, excess_k));

@@ -55,7 +55,7 @@ mod tests {
         Part::Comb { frequency_hz: 8.0, width_hz: 0.1, std_k, goes_on: true }
     }
 
-    /// A cascade ends at half the rate at which its record is read; what needs more states than there are is left out, and so is
+    /// A cascade goes on to eight times half the rate at which its record is read; what needs more states than there are is left out, and so is
     /// noise, with which nothing of the gas is left.
     #[test]
     fn parts_are_fitted_to_the_record_at_hand() {
@@ -63,7 +63,7 @@ mod tests {
         let noise = Part::Noise([1.0, 1.1]);
         let all = [vec![turbulent(500.0), noise.clone()], vec![comb(vec![1.0; 8])], vec![noise]];
         let parts = GasParts::of(all.iter().map(|parts| &parts[..]));
-        assert_eq!(parts.within(0.01, 16), [vec![turbulent(50.0)]]);
+        assert_eq!(parts.within(0.01, 16), [vec![turbulent(400.0)]]);
         assert_eq!(parts.within(0.01, 18).len(), 2);
     }
 

@@ -23,7 +23,10 @@ const MIN_WIDTH_CYCLES_PER_SPAN: f64 = 0.01;
 const MAX_WIDTH_SHARE: f64 = 0.2;
 
 /// Rough terms of a turbulent part.
-const CASCADE_TERMS: usize = 4;
+const CASCADE_TERMS: usize = 5;
+/// The highest corner of turbulence, in units of half the sampling rate. Above it the spectrum falls as `1/f²`, with two thirds of what is
+/// there: of what is beyond half the sampling rate `(1 − 8^(−2/3)/3)` is left, 92 %; with the highest corner at that rate, two thirds.
+const FASTEST_PER_NYQUIST: f64 = 8.0;
 
 /// Noise has at least this share of the variance that it was thought to have.
 const MIN_NOISE_VARIANCE_SHARE: f64 = 1e-3;
@@ -39,6 +42,13 @@ pub(super) struct Limits {
     pub(super) period_s: f64,
 }
 
+impl Limits {
+    /// The highest corner of turbulence.
+    pub(super) const fn fastest_hz(&self) -> f64 {
+        fastest_hz(self.period_s)
+    }
+}
+
 /// One part of the gas's motion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -49,7 +59,7 @@ pub(super) enum Part {
     Noise([f64; 2]),
     Single(Term),
     /// Turbulence, whose spectrum falls as `f^(−5/3)` above a corner (Kolmogorov 1941): rough terms
-    /// with corners evenly spaced in their logarithm from that one to the fastest that is sampled,
+    /// with corners evenly spaced in their logarithm from that one to one beyond what is sampled,
     /// their variances as `f^(−2/3)`.
     Turbulent {
         std_k: f64,
@@ -158,7 +168,7 @@ impl Part {
     pub(super) fn read_every(&self, period_s: f64) -> Self {
         match self {
             Self::Turbulent { std_k, corner_hz, .. } => {
-                Self::Turbulent { std_k: *std_k, corner_hz: *corner_hz, fastest_hz: 0.5 / period_s }
+                Self::Turbulent { std_k: *std_k, corner_hz: *corner_hz, fastest_hz: fastest_hz(period_s) }
             }
             other => other.clone(),
         }
@@ -175,7 +185,7 @@ impl Part {
     pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::Noise(_) => "noise",
-            Self::Single(Term::Resonance { quality, .. }) if *quality > 1.0 => "line",
+            Self::Single(Term::Resonance { quality, .. }) if is_line(*quality) => "line",
             Self::Single(Term::Resonance { .. }) => "smooth",
             Self::Single(Term::Rough { .. }) => "rough",
             Self::Turbulent { .. } => "turbulent",
@@ -189,16 +199,22 @@ impl Part {
         matches!(self, Self::Comb { .. })
     }
 
-    /// A comb that ends in place of one that goes on, and the other way about.
-    pub(super) fn otherwise(&self) -> Option<Self> {
-        match self {
-            Self::Comb { frequency_hz, width_hz, std_k, goes_on } => Some(Self::Comb {
-                frequency_hz: *frequency_hz,
-                width_hz: *width_hz,
-                std_k: std_k.clone(),
-                goes_on: !goes_on,
-            }),
-            _ => None,
+    /// What explains nearly the same with another continuation: a comb that ends in place of one that goes on, and the other way about;
+    /// a broad spectrum that falls faster or more slowly above the same corner.
+    pub(super) fn otherwise(&self, limits: &Limits) -> Vec<Self> {
+        let rough = |std_k, corner_hz| Self::Single(Term::Rough { std_k, corner_hz });
+        let turbulent = |std_k, corner_hz| Self::Turbulent { std_k, corner_hz, fastest_hz: limits.fastest_hz() };
+        match *self {
+            Self::Comb { frequency_hz, width_hz, ref std_k, goes_on } => {
+                vec![Self::Comb { frequency_hz, width_hz, std_k: std_k.clone(), goes_on: !goes_on }]
+            }
+            Self::Single(Term::Rough { std_k, corner_hz }) => vec![turbulent(std_k, corner_hz)],
+            Self::Turbulent { std_k, corner_hz, .. } => vec![rough(std_k, corner_hz)],
+            Self::Single(Term::Resonance { std_k, frequency_hz, quality }) if !is_line(quality) => {
+                let corner_hz = frequency_hz * quality;
+                vec![rough(std_k, corner_hz), turbulent(std_k, corner_hz)]
+            }
+            _ => Vec::new(),
         }
     }
 
@@ -254,6 +270,16 @@ impl Part {
     }
 }
 
+/// The highest corner of turbulence that is read every `period_s`.
+const fn fastest_hz(period_s: f64) -> f64 {
+    0.5 * FASTEST_PER_NYQUIST / period_s
+}
+
+/// Whether an oscillator has a peak, rather than corners alone.
+const fn is_line(quality: f64) -> bool {
+    quality > 1.0
+}
+
 /// How the standard deviation of [`tail`] changes with the `a`-th of those of the lines.
 fn tail_by(std_k: &[f64], a: usize) -> f64 {
     let last = std_k.len() - 1;
@@ -305,6 +331,31 @@ pub(super) fn with(like: &[Part], x: &[f64]) -> Vec<Part> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::prior::Prior;
+
+    /// Above any frequency a spectrum `f^(−5/3)` has 3/2 of that frequency times the spectrum there, and one that goes on as `1/f²` two thirds of
+    /// that. A quarter of what is above half the sampling rate is above eight times that rate.
+    #[test]
+    fn turbulence_goes_on_beyond_what_is_sampled() {
+        let limits = Limits { swing_k: 3.0, span_s: 1000.0, period_s: 0.01 };
+        let turbulent = Part::Turbulent { std_k: 3.0, corner_hz: 0.1, fastest_hz: limits.fastest_hz() };
+        let prior = Prior { level_c: 0.0, terms: turbulent.terms() };
+        let above = prior.variance_above_k2(50.0) / (2.0 * 50.0 * prior.density_k2_per_hz(50.0));
+        assert!((1.5 * (1.0 - 0.25 / 3.0)..1.5).contains(&above), "{above}");
+    }
+
+    #[test]
+    fn a_broad_part_is_exchanged_for_one_with_its_corner() {
+        let limits = Limits { swing_k: 3.0, span_s: 1000.0, period_s: 0.01 };
+        let smooth = Part::Single(Term::Resonance { std_k: 3.0, frequency_hz: 5.0, quality: 0.4 });
+        let rough = Part::Single(Term::Rough { std_k: 3.0, corner_hz: 2.0 });
+        let turbulent = Part::Turbulent { std_k: 3.0, corner_hz: 2.0, fastest_hz: 400.0 };
+        assert_eq!(smooth.otherwise(&limits), [rough.clone(), turbulent.clone()]);
+        assert_eq!(rough.otherwise(&limits), [turbulent.clone()]);
+        assert_eq!(turbulent.otherwise(&limits), [rough]);
+        let line = Part::Single(Term::Resonance { std_k: 3.0, frequency_hz: 5.0, quality: 4.0 });
+        assert_eq!(line.otherwise(&limits), []);
+    }
 
     /// Below the second corner, `f₀/Q`, both spectra agree within `(f Q/f₀)²`, and at rest within `Q²`.
     #[test]
