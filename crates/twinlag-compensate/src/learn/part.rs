@@ -351,8 +351,9 @@ mod tests {
         let rough = Part::Single(Term::Rough { std_k: 3.0, corner_hz: 2.0 });
         let turbulent = Part::Turbulent { std_k: 3.0, corner_hz: 2.0, fastest_hz: 400.0 };
         assert_eq!(smooth.otherwise(&limits), [rough.clone(), turbulent.clone()]);
-        assert_eq!(rough.otherwise(&limits), [turbulent.clone()]);
-        assert_eq!(turbulent.otherwise(&limits), [rough]);
+        let [of_rough, of_turbulent] = [&rough, &turbulent].map(|part| part.otherwise(&limits));
+        assert_eq!(of_rough, [turbulent]);
+        assert_eq!(of_turbulent, [rough]);
         let line = Part::Single(Term::Resonance { std_k: 3.0, frequency_hz: 5.0, quality: 4.0 });
         assert_eq!(line.otherwise(&limits), []);
     }
