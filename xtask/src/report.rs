@@ -104,13 +104,14 @@ pub(crate) fn browser(given: Option<&Path>) -> Result<PathBuf> {
     given.map(Path::to_owned).or_else(found).context("no browser: install Chromium, or name one with --browser")
 }
 
-/// The folder of npm's packages below `dir`, once they are there.
+/// Installs npm's packages below `dir` unless they are there, and returns their folder.
 pub(crate) fn with_packages(dir: &Path) -> Result<PathBuf> {
     let wanted = root()?.join("xtask/report/package.json");
     let (asked, packages) = (dir.join("package.json"), dir.join("node_modules"));
     if !packages.exists() || fs::read(&asked).ok() != Some(fs::read(&wanted)?) {
-        fs::copy(wanted, asked)?;
-        step("npm", &["install", "--no-audit", "--no-fund"], dir)?;
+        fs::copy(wanted, &asked)?;
+        // What is not installed is asked for again.
+        step("npm", &["install", "--no-audit", "--no-fund"], dir).inspect_err(|_| drop(fs::remove_file(&asked)))?;
     }
     Ok(packages)
 }

@@ -1,7 +1,7 @@
 //! The page for a browser: built as one HTML file, and driven in Chromium.
 //!
-//! It takes the target `wasm32-unknown-unknown`, Node.js and npm, and a browser to be driven. The program that binds WebAssembly to JavaScript,
-//! and the one that orders its functions, are installed below `target/web`.
+//! To build it takes the target `wasm32-unknown-unknown`, Node.js and npm; to drive it, Chromium too. The binder and Binaryen's `wasm-opt` are
+//! installed below `target/web`.
 
 use std::fs;
 use std::io::Write;
@@ -125,7 +125,7 @@ fn bound(work: &Path) -> Result<PathBuf> {
     let optimizer = with_packages(work)?.join(".bin/wasm-opt").display().to_string();
     for part in PARTS {
         let wasm = out.join(part.file("_bg.wasm")).display().to_string();
-        // Names of functions are not written again.
+        // Without `-g`, `wasm-opt` writes no names of functions.
         step(&optimizer, &[&ORDER[..], &[&wasm, "--output", &wasm]].concat(), root)?;
     }
     Ok(out)

@@ -342,8 +342,7 @@ impl Search<'_> {
         }
     }
 
-    /// `current` with one part left out, or one of each kind in its place, or a comb that ends
-    /// elsewhere.
+    /// `current` with one part left out, or one of each kind in its place, or one that continues otherwise.
     fn exchanged(&self, current: &Fitted) -> Vec<Fitted> {
         let gas = (0..current.parts.len()).filter(|i| current.parts[*i].noise().is_none());
         let others: Vec<Vec<Fitted>> =

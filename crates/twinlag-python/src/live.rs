@@ -28,7 +28,7 @@ struct Asked {
 /// Name and number of the layout of a state: a line with the SHA-256 of the next one, which is [`LiveState`].
 const STATE_SCHEMA: &str = "twinlag.live-state-file/1";
 
-/// A state that is none.
+/// `error` as Python's `ValueError`.
 fn refused(error: impl ToString) -> PyErr {
     PyValueError::new_err(error.to_string())
 }

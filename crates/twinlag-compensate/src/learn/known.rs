@@ -55,7 +55,7 @@ mod tests {
         Part::Comb { frequency_hz: 8.0, width_hz: 0.1, std_k, goes_on: true }
     }
 
-    /// A cascade goes on to eight times half the rate at which its record is read; what needs more states than there are is left out, and so is
+    /// A cascade goes on to four times the rate at which its record is read; what needs more states than there are is left out, and so is
     /// noise, with which nothing of the gas is left.
     #[test]
     fn parts_are_fitted_to_the_record_at_hand() {

@@ -24,8 +24,8 @@ const MAX_WIDTH_SHARE: f64 = 0.2;
 
 /// Rough terms of a turbulent part.
 const CASCADE_TERMS: usize = 5;
-/// The highest corner of turbulence, in units of half the sampling rate. Above it the spectrum falls as `1/f²`, with two thirds of what is
-/// there: of what is beyond half the sampling rate `(1 − 8^(−2/3)/3)` is left, 92 %; with the highest corner at that rate, two thirds.
+/// The highest corner of turbulence, in units of half the sampling rate, beyond which turbulence goes on. Above the highest corner the sum
+/// falls as `1/f²`: with it at half the sampling rate, a third and more of the variance above that rate was missing.
 const FASTEST_PER_NYQUIST: f64 = 8.0;
 
 /// Noise has at least this share of the variance that it was thought to have.
@@ -199,8 +199,8 @@ impl Part {
         matches!(self, Self::Comb { .. })
     }
 
-    /// What explains nearly the same with another continuation: a comb that ends in place of one that goes on, and the other way about;
-    /// a broad spectrum that falls faster or more slowly above the same corner.
+    /// Parts that explain nearly the same and continue otherwise: a comb that ends for one that goes on, and the other way about; rough for
+    /// turbulent, and the other way about; either for smooth, with its first corner, about `f₀ Q`.
     pub(super) fn otherwise(&self, limits: &Limits) -> Vec<Self> {
         let rough = |std_k, corner_hz| Self::Single(Term::Rough { std_k, corner_hz });
         let turbulent = |std_k, corner_hz| Self::Turbulent { std_k, corner_hz, fastest_hz: limits.fastest_hz() };
@@ -275,7 +275,7 @@ const fn fastest_hz(period_s: f64) -> f64 {
     0.5 * FASTEST_PER_NYQUIST / period_s
 }
 
-/// Whether an oscillator has a peak, rather than corners alone.
+/// Whether an oscillator counts as a line.
 const fn is_line(quality: f64) -> bool {
     quality > 1.0
 }
@@ -334,7 +334,8 @@ mod tests {
     use crate::prior::Prior;
 
     /// Above any frequency a spectrum `f^(−5/3)` has 3/2 of that frequency times the spectrum there, and one that goes on as `1/f²` two thirds of
-    /// that. A quarter of what is above half the sampling rate is above eight times that rate.
+    /// that. Of what is above half the sampling rate a quarter is above eight times half that rate. The bounds are those of spectra that change
+    /// their slope at once; a sum of first-order noises stays inside for a corner far below half the sampling rate.
     #[test]
     fn turbulence_goes_on_beyond_what_is_sampled() {
         let limits = Limits { swing_k: 3.0, span_s: 1000.0, period_s: 0.01 };

@@ -49,7 +49,7 @@ fn a_gas_temperature_rests_on_the_sensor_that_is_trusted() {
     }
 }
 
-/// Sensors that sink through a thermocline with layers, at irregular depths, of which the second reads 1.3 % too little.
+/// Two sensors sink through a thermocline with layers at irregular depths; the second has a gain of 0.987.
 fn two_lags_in_layers() -> Rig {
     const SAMPLES: usize = 2500;
     let layer = |depth: f64, j: i32| {
